@@ -1,0 +1,73 @@
+"""How kernels are compiled, and where the compiled code is kept.
+
+Numba's own cache misses changes in functions that a kernel calls from another file. The cache
+folder is therefore named by a hash of every file that holds kernels and of numba's version.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import numba
+from numba.core import config
+
+F = TypeVar("F", bound=Callable[..., object])
+
+_KEPT_CACHES = 3
+
+
+def _kernel_hash() -> str:
+    """Hash the sources of all modules that define kernels (those that import this one)."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256(f"numba {numba.__version__}".encode())
+    for path in sorted(root.rglob("*.py")):
+        source = path.read_bytes()
+        if b"forest._jit import" in source or path.name == "_jit.py":
+            digest.update(path.relative_to(root).as_posix().encode())
+            digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _choose_cache() -> Path:
+    """Choose this version's cache folder and drop the oldest of the others."""
+    base = os.environ.get("FOREST_CACHE") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    root = Path(base).expanduser() / "forest-kernels"
+    folder = root / _kernel_hash()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        others = sorted(root.iterdir(), key=lambda p: p.stat().st_mtime, reverse=True)
+        for old in others[_KEPT_CACHES:]:
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        pass
+    return folder
+
+
+CACHE = _choose_cache()
+config.CACHE_DIR = str(CACHE)
+
+
+def is_cold() -> bool:
+    """Tell whether no kernel of this version has been compiled on this machine yet."""
+    return not any(CACHE.rglob("*.nbi"))
+
+
+def njit(function: F) -> F:
+    """Compile a serial kernel: cached, no fastmath, division as in C."""
+    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+
+
+def njit_parallel(function: F) -> F:
+    """Compile a driver that runs fixed chunks in threads (three times the compile time)."""
+    return numba.njit(cache=True, error_model="numpy", nogil=True, parallel=True)(function)  # type: ignore[no-any-return]
+
+
+def inline(function: F) -> F:
+    """Compile a small function into its callers."""
+    return numba.njit(cache=True, error_model="numpy", nogil=True, inline="never")(function)  # type: ignore[no-any-return]

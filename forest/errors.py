@@ -1,0 +1,37 @@
+"""The one error that a user's input can cause."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """Input that the program refuses: what is wrong, where, and what was expected.
+
+    The message is one line. The command line prints it and exits with code 2.
+
+    Parameters
+    ----------
+    what : str
+        What is wrong, e.g. ``"unknown key 'yeers'"``.
+    where : str, optional
+        File and key, e.g. ``"stand.toml: plot.size_m"``.
+    expected : str, optional
+        What would have been right, e.g. ``"a number of years, 1 to 10000"``.
+    """
+
+    def __init__(self, what: str, *, where: str = "", expected: str = "") -> None:
+        parts = [f"{where}: " if where else "", what]
+        if expected:
+            parts.append(f"; expected {expected}")
+        super().__init__(" ".join("".join(parts).split()))
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Give a hint that names the known word closest to `name`, or list the known words."""
+    choices = sorted(known)
+    close = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return "one of " + ", ".join(choices)

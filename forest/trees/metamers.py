@@ -1,0 +1,169 @@
+"""The arena: the metamers of all trees, one NumPy array per field.
+
+A metamer is an internode with the node at its upper end; the node bears a lateral bud, and the
+last metamer of an axis also bears the terminal bud. Each tree owns one contiguous extent of the
+arena with slack at its end. Inside an extent a parent always stands before its children, so a
+basipetal pass is one backward scan and an acropetal pass one forward scan.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Bits of Metamers.state
+MAIN = np.uint8(1)  # continues its parent's axis (else it starts an axis of its own)
+TERMINAL = np.uint8(2)  # bears a living terminal bud
+LATERAL = np.uint8(4)  # bears a living lateral bud that has not grown out
+BRANCHED = np.uint8(8)  # its lateral bud has grown out into a branch
+CONTINUED = np.uint8(16)  # its axis goes on: another metamer follows on the same axis
+
+#: Fields of the arena: name -> (dtype, items per metamer, meaning).
+FIELDS: dict[str, tuple[type, int, str]] = {
+    "parent": (np.int32, 1, "index of the parent, relative to the tree's extent; -1 at the base"),
+    "serial": (np.int32, 1, "number that never changes, counted per tree from 0"),
+    "tip": (np.float32, 3, "upper end, relative to the tree's base, m"),
+    "bud": (np.float32, 3, "unit direction of the lateral bud"),
+    "length": (np.float32, 1, "internode length, m"),
+    "pipe": (np.float32, 1, "diameter to the pipe exponent n, d^n, m^n (never decreases)"),
+    "sapwood": (np.float32, 1, "the part of pipe that is sapwood, m^n"),
+    "light": (np.float32, 1, "light Q of the buds at the node (4.1)"),
+    "resource": (np.float32, 2, "resource v of the terminal and the lateral bud; their fraction"),
+    "birth": (np.int16, 1, "step in which it was made, counted from the start of the run"),
+    "order": (np.uint8, 1, "branching order, 0 on the trunk"),
+    "state": (np.uint8, 1, "bits MAIN, TERMINAL, LATERAL, BRANCHED, CONTINUED"),
+    "deficit": (np.uint8, 1, "years in a row in which its sites did not pay"),
+    "shoot_height": (np.uint8, 1, "place in its year's shoot, 0 (base) to 255 (tip)"),
+}
+
+
+class Metamers(NamedTuple):
+    """The arena's arrays, as kernels take them. See `FIELDS` for dtype, unit and meaning."""
+
+    parent: NDArray[np.int32]
+    serial: NDArray[np.int32]
+    tip: NDArray[np.float32]
+    bud: NDArray[np.float32]
+    length: NDArray[np.float32]
+    pipe: NDArray[np.float32]
+    sapwood: NDArray[np.float32]
+    light: NDArray[np.float32]
+    resource: NDArray[np.float32]
+    birth: NDArray[np.int16]
+    order: NDArray[np.uint8]
+    state: NDArray[np.uint8]
+    deficit: NDArray[np.uint8]
+    shoot_height: NDArray[np.uint8]
+
+
+BYTES_PER_METAMER = sum(np.dtype(t).itemsize * k for t, k, _ in FIELDS.values())
+
+
+def allocate(capacity: int) -> Metamers:
+    """Make an arena of `capacity` metamers; memory is touched only when it is used."""
+    arrays: dict[str, NDArray[Any]] = {
+        name: np.empty(capacity if k == 1 else (capacity, k), dtype)
+        for name, (dtype, k, _) in FIELDS.items()
+    }
+    return Metamers(**arrays)
+
+
+class Arena:
+    """The metamers of all trees and the room between them.
+
+    `used` is the end of the last extent. Extents are handed out at the end; when the end is
+    reached, `make_room` closes the holes and, only if that is not enough, grows the arrays.
+    """
+
+    #: Slack left behind a tree when it is placed, as a share of its size.
+    SLACK = 0.12
+    #: Growth of the arrays when they are full.
+    GROWTH = 1.25
+
+    def __init__(self, capacity: int = 4096) -> None:
+        self.metamers = allocate(max(capacity, 16))
+        self.used = 0
+
+    @property
+    def capacity(self) -> int:
+        """Number of metamers that the arrays can hold."""
+        return len(self.metamers.parent)
+
+    def make_room(
+        self,
+        start: NDArray[np.int64],
+        size: NDArray[np.int32],
+        room: NDArray[np.int32],
+        wanted: NDArray[np.int64],
+    ) -> None:
+        """Give each tree an extent of at least `wanted` metamers.
+
+        Parameters
+        ----------
+        start, size, room : arrays of one entry per tree
+            First metamer, metamers in use and length of each extent; `start` and `room` are
+            changed in place.
+        wanted : int64 array
+            Metamers that each tree must be able to hold.
+        """
+        short = np.flatnonzero(wanted > room)
+        if short.size == 0:
+            return
+        target = wanted[short] + (wanted[short] * self.SLACK).astype(np.int64) + 4
+        if self.used + int(target.sum()) <= self.capacity:
+            for tree, length in zip(short, target, strict=True):
+                self._move(int(start[tree]), self.used, int(size[tree]))
+                start[tree] = self.used
+                room[tree] = length
+                self.used += int(length)
+            return
+        self._repack(start, size, room, wanted)
+
+    def _move(self, source: int, to: int, n: int) -> None:
+        for field in self.metamers:
+            field[to : to + n] = field[source : source + n]
+
+    def _repack(
+        self,
+        start: NDArray[np.int64],
+        size: NDArray[np.int32],
+        room: NDArray[np.int32],
+        wanted: NDArray[np.int64],
+    ) -> None:
+        """Close all holes, then spread the extents with fresh slack, growing if needed."""
+        by_place = np.argsort(start, kind="stable")
+        end = 0
+        for tree in by_place:
+            n = int(size[tree])
+            if start[tree] != end:
+                self._move(int(start[tree]), end, n)
+                start[tree] = end
+            end += n
+        need = np.maximum(wanted, size).astype(np.int64)
+        length = need + (need * self.SLACK).astype(np.int64) + 4
+        total = int(length.sum())
+        if total > self.capacity:
+            self._grow(int(total * self.GROWTH), end)
+        place = np.empty(len(start), np.int64)
+        place[by_place] = np.concatenate(([0], np.cumsum(length[by_place])[:-1]))
+        for tree in by_place[::-1]:
+            if place[tree] != start[tree]:
+                self._move(int(start[tree]), int(place[tree]), int(size[tree]))
+        start[:] = place
+        room[:] = length
+        self.used = total
+
+    def _grow(self, capacity: int, used: int) -> None:
+        """Grow field by field, so that at most one field is held twice."""
+        grown: dict[str, NDArray[Any]] = {}
+        old = self.metamers._asdict()
+        del self.metamers
+        for name in list(old):
+            field = old.pop(name)
+            new = np.empty((capacity, *field.shape[1:]), field.dtype)
+            new[:used] = field[:used]
+            grown[name] = new
+            del field
+        self.metamers = Metamers(**grown)

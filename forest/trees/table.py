@@ -1,0 +1,69 @@
+"""The tree table: one row per living tree, one array per column, in order of tree id."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Columns of the table: name -> (dtype, items, meaning).
+COLUMNS: dict[str, tuple[type, int, str]] = {
+    "tree_id": (np.int32, 1, "number of the tree, from 1, never used twice"),
+    "species": (np.int16, 1, "index into the scenario's list of species"),
+    "x": (np.float64, 1, "place of the stem base, m"),
+    "y": (np.float64, 1, "place of the stem base, m"),
+    "base_voxel": (np.int32, 3, "near-field voxel of the base (ix, iy, iz)"),
+    "base_offset": (np.float32, 3, "place of the base inside that voxel, m"),
+    "birth": (np.int32, 1, "step in which it was planted or recruited"),
+    "mother_id": (np.int32, 1, "tree that seeded it; 0 if planted"),
+    "start": (np.int64, 1, "first metamer of its extent in the arena"),
+    "size": (np.int32, 1, "metamers in use"),
+    "room": (np.int32, 1, "metamers that its extent can hold"),
+    "next_serial": (np.int32, 1, "serial number of its next metamer"),
+    "vigour": (np.float32, 1, "lasting factor on its production"),
+    "reserve": (np.float64, 1, "stored dry mass, kg"),
+    "bad_years": (np.int32, 1, "years in a row of a net income below the limit"),
+    "breast_serial": (np.int32, 1, "serial of the metamer at 1.3 m; -1 while there is none"),
+    "breast_radius": (np.float32, 1, "radius under bark there at the end of last year, m"),
+}
+
+
+class Trees(NamedTuple):
+    """The table's columns, as kernels take them. See `COLUMNS`."""
+
+    tree_id: NDArray[np.int32]
+    species: NDArray[np.int16]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    base_voxel: NDArray[np.int32]
+    base_offset: NDArray[np.float32]
+    birth: NDArray[np.int32]
+    mother_id: NDArray[np.int32]
+    start: NDArray[np.int64]
+    size: NDArray[np.int32]
+    room: NDArray[np.int32]
+    next_serial: NDArray[np.int32]
+    vigour: NDArray[np.float32]
+    reserve: NDArray[np.float64]
+    bad_years: NDArray[np.int32]
+    breast_serial: NDArray[np.int32]
+    breast_radius: NDArray[np.float32]
+
+
+def empty(n: int = 0) -> Trees:
+    """Make a table of `n` rows of zeros."""
+    arrays: dict[str, NDArray[Any]] = {
+        name: np.zeros(n if k == 1 else (n, k), dtype) for name, (dtype, k, _) in COLUMNS.items()
+    }
+    return Trees(**arrays)
+
+
+def append(trees: Trees, more: Trees) -> Trees:
+    """Give a table with the rows of `more` behind those of `trees`."""
+    return Trees(*(np.concatenate((a, b)) for a, b in zip(trees, more, strict=True)))
+
+
+def keep(trees: Trees, rows: NDArray[np.bool_]) -> Trees:
+    """Give a table of the rows for which `rows` is true."""
+    return Trees(*(np.ascontiguousarray(column[rows]) for column in trees))
