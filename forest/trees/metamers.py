@@ -19,6 +19,8 @@ TERMINAL = np.uint8(2)  # bears a living terminal bud
 LATERAL = np.uint8(4)  # bears a living lateral bud that has not grown out
 BRANCHED = np.uint8(8)  # its lateral bud has grown out into a branch
 CONTINUED = np.uint8(16)  # its axis goes on: another metamer follows on the same axis
+NO_ROOM_TERMINAL = np.uint8(32)  # its terminal bud found no marker this year
+NO_ROOM_LATERAL = np.uint8(64)  # its lateral bud found no marker this year
 
 #: Fields of the arena: name -> (dtype, items per metamer, meaning).
 FIELDS: dict[str, tuple[type, int, str]] = {
@@ -33,7 +35,7 @@ FIELDS: dict[str, tuple[type, int, str]] = {
     "resource": (np.float32, 2, "resource v of the terminal and the lateral bud; their fraction"),
     "birth": (np.int16, 1, "step in which it was made, counted from the start of the run"),
     "order": (np.uint8, 1, "branching order, 0 on the trunk"),
-    "state": (np.uint8, 1, "bits MAIN, TERMINAL, LATERAL, BRANCHED, CONTINUED"),
+    "state": (np.uint8, 1, "bits MAIN, TERMINAL, LATERAL, BRANCHED, CONTINUED, NO_ROOM_*"),
     "deficit": (np.uint8, 1, "years in a row in which its sites did not pay"),
     "shoot_height": (np.uint8, 1, "place in its year's shoot, 0 (base) to 255 (tip)"),
 }
