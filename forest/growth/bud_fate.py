@@ -1,0 +1,186 @@
+"""How the resource is shared among buds: Palubicki et al. 2009, section 4.2.
+
+Light flows basipetally, resource flows back acropetally. Both models fill `v_main` and `v_side`:
+the resource that leaves each node towards the continuation of its axis (or its terminal bud) and
+towards its branch (or its lateral bud).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forest._jit import njit
+
+_MAIN = 1
+_TERMINAL = 2
+_LATERAL = 4
+_BRANCHED = 8
+_CONTINUED = 16
+_NO_ROOM_TERMINAL = 32
+_NO_ROOM_LATERAL = 64
+
+
+@njit
+def gather_light(parent, state, light, order, max_order, q_main, q_side):  # type: ignore[no-untyped-def]
+    """Sum the light Q of buds basipetally (first pass of 4.2); one backward scan.
+
+    Parameters
+    ----------
+    parent, state, light, order : arrays (n,)
+        One tree's extent of the arena.
+    max_order : int
+        Axes of this order bear leaves but no branches: their lateral buds count, unfed.
+    q_main, q_side : float64 (n,)
+        Filled: light of the continuing axis (Q_m) and of the branch (Q_l) at each node.
+
+    Returns
+    -------
+    float
+        Q_base, the light of the whole tree.
+    """
+    n = len(parent)
+    for i in range(n):
+        s = state[i]
+        q = np.float64(light[i])
+        q_main[i] = q if (s & _TERMINAL) and not (s & _NO_ROOM_TERMINAL) else 0.0
+        q_side[i] = q if (s & _LATERAL) and not (s & _NO_ROOM_LATERAL) else 0.0
+    for i in range(n - 1, 0, -1):
+        q = q_main[i] + q_side[i]
+        if state[i] & _MAIN:
+            q_main[parent[i]] += q
+        else:
+            q_side[parent[i]] += q
+    return q_main[0] + q_side[0]
+
+
+@njit
+def share_borchert_honda(  # type: ignore[no-untyped-def]
+    parent, state, order, q_main, q_side, weights, bias, v_base, v_main, v_side
+):
+    """Share the resource by the extended Borchert-Honda model; one forward scan (4.2, Fig. 8a).
+
+    v_m = v lambda Q_m / (lambda Q_m + (1 - lambda) Q_l), v_l = v - v_m.
+
+    Parameters
+    ----------
+    weights : float64 (2, n)
+        Factors on Q_m and Q_l (ones, or the mean growth rates of `balance`).
+    bias : float64 (orders,)
+        lambda of each order; the last holds for higher orders.
+    v_base : float
+        Resource at the base, alpha Q_base.
+    """
+    n = len(parent)
+    last = len(bias) - 1
+    for i in range(n):
+        if i == 0:
+            v = v_base
+        elif state[i] & _MAIN:
+            v = v_main[parent[i]]
+        else:
+            v = v_side[parent[i]]
+        lam = bias[min(np.int64(order[i]), last)]
+        main = lam * q_main[i] * weights[0, i]
+        side = (1.0 - lam) * q_side[i] * weights[1, i]
+        total = main + side
+        if total > 0.0:
+            v_main[i] = v * (main / total)
+            v_side[i] = v - v_main[i]
+        else:
+            v_main[i] = 0.0
+            v_side[i] = 0.0
+
+
+@njit
+def _weight(position, n, w_max, w_min, kappa):  # type: ignore[no-untyped-def]
+    """Weight of a place in the priority list (Fig. 8c): falls linearly until kappa N."""
+    end = kappa * n
+    if position >= end:
+        return w_min
+    return w_max + (w_min - w_max) * (position / end)
+
+
+@njit
+def share_priority(  # type: ignore[no-untyped-def]
+    parent, state, order, q_main, q_side, weights, control, shape, v_base, v_main, v_side, ints
+):
+    """Share the resource by the priority model, axis by axis (4.2, Fig. 8b, 8c).
+
+    On each axis the supported branches and buds are sorted by their mean light; under apical
+    control the terminal bud stands first. Place k of N gets v_k = v Q_k w_k / sum(Q_j w_j).
+
+    Parameters
+    ----------
+    control : float64 (orders,)
+        1 where axes of that order are under apical control, else 0.
+    shape : (w_max, w_min, kappa)
+        The weight function.
+    ints : int32 (4, n)
+        Scratch.
+    """
+    n = len(parent)
+    last = len(control) - 1
+    buds = ints[0]
+    follower = ints[1]
+    items = ints[2]
+    w_max, w_min, kappa = shape
+    for i in range(n):
+        buds[i] = 0
+        follower[i] = -1
+    # buds[i] counts the living buds of everything that the branch at node i supports
+    for i in range(n - 1, -1, -1):
+        s = state[i]
+        own = buds[i] + (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
+        ints[3, i] = own
+        if i > 0:
+            if s & _MAIN:
+                follower[parent[i]] = i
+            buds[parent[i]] += own
+    for head in range(n):
+        if head > 0 and state[head] & _MAIN:
+            continue
+        v = v_base if head == 0 else v_side[parent[head]]
+        count = 0
+        i = np.int32(head)
+        tip = i
+        while i >= 0:
+            s = state[i]
+            v_main[i] = 0.0
+            v_side[i] = 0.0
+            if s & (_LATERAL | _BRANCHED) and q_side[i] > 0.0:
+                items[count] = i
+                count += 1
+            tip = i
+            i = follower[i]
+        # while the axis is walked v_side holds the mean light of each item, the sorting key
+        for k in range(count):
+            j = items[k]
+            number = 1
+            if state[j] & _BRANCHED:
+                on_main = ints[3, follower[j]] if follower[j] >= 0 else 0
+                number = max(1, buds[j] - on_main)
+            v_side[j] = q_side[j] / number
+        has_tip = state[tip] & _TERMINAL and q_main[tip] > 0.0
+        key = v_side[items[:count]]
+        by_light = np.argsort(-key, kind="mergesort")
+        total_items = count + (1 if has_tip else 0)
+        tip_place = 0
+        if has_tip and not control[min(np.int64(order[head]), last)] > 0.0:
+            while tip_place < count and key[by_light[tip_place]] >= q_main[tip]:
+                tip_place += 1
+        total = 0.0
+        for k in range(count):
+            j = items[by_light[k]]
+            place = k + 1 if has_tip and k >= tip_place else k
+            share = q_side[j] * weights[1, j] * _weight(place, total_items, w_max, w_min, kappa)
+            v_side[j] = share
+            total += share
+        if has_tip:
+            share = q_main[tip] * weights[0, tip]
+            share *= _weight(tip_place, total_items, w_max, w_min, kappa)
+            v_main[tip] = share
+            total += share
+        scale = v / total if total > 0.0 else 0.0
+        for k in range(count):
+            v_side[items[k]] *= scale
+        v_main[tip] *= scale

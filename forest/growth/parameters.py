@@ -1,0 +1,179 @@
+"""What growth kernels know of the species and of the year: plain arrays and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest.species import Species
+
+#: Orders told apart where a parameter is given by order; higher orders use the last.
+MAX_ORDERS = 8
+
+# Rows of SpeciesTraits.curve_*: which user-drawn curve (Taylor-Hell 2005, 3.1).
+LENGTH_BY_ORDER = 0
+SHOOTS_BY_HEIGHT = 1
+SHOOTS_BY_ORDER = 2
+SHOOTS_BY_PARENT_LENGTH = 3
+TROPISM_BY_AGE = 4
+TROPISM_BY_ORDER = 5
+_CURVES = (
+    ("architecture", "internode_factor_by_order"),
+    ("architecture", "shoots_by_height_in_year"),
+    ("architecture", "shoots_by_order"),
+    ("architecture", "shoots_by_parent_length"),
+    ("shoots", "tropism_factor_by_age"),
+    ("shoots", "tropism_factor_by_order"),
+)
+
+
+class SpeciesTraits(NamedTuple):
+    """Species parameters as kernels read them: float64, one entry per species.
+
+    Names and units are those of the species files; angles are in radians.
+    """
+
+    internode_length: NDArray[np.float64]
+    branching_angle: NDArray[np.float64]
+    divergence_angle: NDArray[np.float64]
+    angle_jitter: NDArray[np.float64]
+    max_metamers: NDArray[np.float64]
+    max_order: NDArray[np.float64]
+    sylleptic: NDArray[np.float64]
+    sympodial: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+    apical_bias: NDArray[np.float64]
+    w_max: NDArray[np.float64]
+    w_min: NDArray[np.float64]
+    kappa: NDArray[np.float64]
+    light_weight: NDArray[np.float64]
+    tropism_weight: NDArray[np.float64]
+    tropism_x: NDArray[np.float64]
+    tropism_y: NDArray[np.float64]
+    tropism_z: NDArray[np.float64]
+    shed_below: NDArray[np.float64]
+    pipe_exponent: NDArray[np.float64]
+    twig_diameter: NDArray[np.float64]
+    density: NDArray[np.float64]
+    leaf_area: NDArray[np.float64]
+    leaf_mass: NDArray[np.float64]
+    leaf_lifespan: NDArray[np.float64]
+    leaf_retention: NDArray[np.float64]
+    light_use: NDArray[np.float64]
+    maintenance: NDArray[np.float64]
+    sapwood_years: NDArray[np.float64]
+    reserve_fraction: NDArray[np.float64]
+    ring_fraction: NDArray[np.float64]
+    branch_pipe: NDArray[np.float64]
+    hydraulic_length: NDArray[np.float64]
+    first_pipe: NDArray[np.float64]
+    suppression_ratio: NDArray[np.float64]
+    suppression_years: NDArray[np.float64]
+    deficit_years: NDArray[np.float64]
+    abortion: NDArray[np.float64]
+    min_growth: NDArray[np.float64]
+    offset_gain: NDArray[np.float64]
+    light_gain: NDArray[np.float64]
+    offset_length: NDArray[np.float64]
+    apical_until: NDArray[np.float64]
+    curve_n: NDArray[np.int64]
+    curve_x: NDArray[np.float64]
+    curve_y: NDArray[np.float64]
+
+
+class Year(NamedTuple):
+    """What growth kernels know of the year."""
+
+    step: int
+    seed: int
+    income_factor: float
+    full_light: float
+    paper: bool
+    priority: bool
+    balance: bool
+
+
+def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
+    """Pack the species' parameters for the kernels.
+
+    In mass-balance mode pipes add by area, whatever the species' pipe exponent.
+    """
+
+    def each(section: str, key: str, scale: float = 1.0) -> NDArray[np.float64]:
+        return np.array([scale * getattr(getattr(s, section), key) for s in species], np.float64)
+
+    def choice(section: str, key: str, value: str) -> NDArray[np.float64]:
+        return np.array([getattr(getattr(s, section), key) == value for s in species], np.float64)
+
+    degree = float(np.pi / 180.0)
+    tropism = np.array([s.shoots.tropism_direction for s in species], np.float64).reshape(-1, 3)
+    norm = np.linalg.norm(tropism, axis=1)
+    tropism = tropism / np.where(norm > 0.0, norm, 1.0)[:, None]
+    apical = np.full((len(species), MAX_ORDERS), np.inf)
+    for row, s in enumerate(species):
+        until = list(s.bud_fate.apical_control_until_age_years)[:MAX_ORDERS]
+        if until:
+            apical[row] = until[-1]
+            apical[row, : len(until)] = until
+    curves = [[list(getattr(getattr(s, a), b)) for a, b in _CURVES] for s in species]
+    longest = max(1, *(len(c) for row in curves for c in row))
+    curve_n = np.array([[len(c) for c in row] for row in curves], np.int64)
+    curve_x = np.zeros((len(species), len(_CURVES), longest))
+    curve_y = np.ones((len(species), len(_CURVES), longest))
+    for row, of_species in enumerate(curves):
+        for k, curve in enumerate(of_species):
+            for j, (x, y) in enumerate(curve):
+                curve_x[row, k, j] = x
+                curve_y[row, k, j] = y
+    hydraulic = each("carbon", "hydraulic_length_m")
+    return SpeciesTraits(
+        internode_length=each("architecture", "internode_length_m"),
+        branching_angle=each("architecture", "branching_angle_deg", degree),
+        divergence_angle=each("architecture", "divergence_angle_deg", degree),
+        angle_jitter=each("architecture", "angle_jitter_deg", degree),
+        max_metamers=each("architecture", "max_metamers_per_shoot"),
+        max_order=each("architecture", "max_order"),
+        sylleptic=choice("architecture", "ramification", "sylleptic"),
+        sympodial=choice("architecture", "axis", "sympodial"),
+        alpha=each("bud_fate", "alpha"),
+        apical_bias=each("bud_fate", "apical_bias"),
+        w_max=each("bud_fate", "priority_w_max"),
+        w_min=each("bud_fate", "priority_w_min"),
+        kappa=each("bud_fate", "priority_kappa"),
+        light_weight=each("shoots", "light_weight"),
+        tropism_weight=each("shoots", "tropism_weight"),
+        tropism_x=np.ascontiguousarray(tropism[:, 0]),
+        tropism_y=np.ascontiguousarray(tropism[:, 1]),
+        tropism_z=np.ascontiguousarray(tropism[:, 2]),
+        shed_below=each("shedding", "light_per_internode"),
+        pipe_exponent=each("wood", "pipe_exponent") if paper else np.full(len(species), 2.0),
+        twig_diameter=each("wood", "twig_diameter_m"),
+        density=each("wood", "density_kg_m3"),
+        leaf_area=each("leaves", "area_m2"),
+        leaf_mass=each("leaves", "area_m2") / each("leaves", "sla_m2_kg"),
+        leaf_lifespan=each("leaves", "lifespan_years"),
+        leaf_retention=each("leaves", "retention_years"),
+        light_use=each("carbon", "light_use_efficiency_kg_m2"),
+        maintenance=each("carbon", "maintenance_per_year"),
+        sapwood_years=each("carbon", "sapwood_years"),
+        reserve_fraction=each("carbon", "reserve_fraction"),
+        ring_fraction=each("carbon", "ring_fraction"),
+        branch_pipe=each("carbon", "branch_pipe_ratio"),
+        hydraulic_length=np.where(hydraulic > 0.0, hydraulic, np.inf),
+        first_pipe=each("carbon", "first_pipe_diameter_m"),
+        suppression_ratio=each("carbon", "suppression_ratio"),
+        suppression_years=each("carbon", "suppression_years"),
+        deficit_years=each("carbon", "deficit_years"),
+        abortion=each("carbon", "abortion_probability"),
+        min_growth=each("balance", "min_growth"),
+        offset_gain=each("balance", "offset_gain"),
+        light_gain=each("balance", "light_gain"),
+        offset_length=each("balance", "offset_length_factor"),
+        apical_until=apical,
+        curve_n=curve_n,
+        curve_x=curve_x,
+        curve_y=curve_y,
+    )
