@@ -1,0 +1,65 @@
+# Everything runs in .venv, which `make setup` makes once and remakes when pyproject.toml changes.
+# Another interpreter: make PYTHON=/path/to/python3.12 setup
+
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+SOURCES := forest tests scenarios analysis docs
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-stand bench lint format docs clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(READY)  ## make .venv and install the project with all its tools
+
+$(READY): pyproject.toml
+	@if ! [ -x $(BIN)/python ]; then \
+	  for python in $(PYTHON) python3.11 python3.12 python3.13 python3; do \
+	    if $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	      found=$$python; break; fi; done; \
+	  [ -n "$$found" ] || { echo "forest needs Python 3.11 or newer: make PYTHON=/path/to/it"; exit 1; }; \
+	  echo "setup: making $(VENV) with $$($$found --version)"; \
+	  $$found -m venv $(VENV); fi
+	@echo "setup: installing the project and its tools (a few minutes the first time)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,docs]'
+	@touch $@
+
+demo: $(READY)  ## grow the Saxony spruce stand for 60 years, print its table, draw it
+	@mkdir -p out
+	@$(BIN)/forest run scenarios/saxony_spruce.toml --out out/run.h5 --force
+	@$(BIN)/forest table out/run.h5
+	@$(BIN)/forest draw out/run.h5 --stand out/stand.png --development out/development.png
+
+# One process compiles the kernels of an ordinary run before two use them; each test worker then
+# takes a copy of that cache (tests/conftest.py).
+test: $(READY)  ## the ordinary tests, on two processes
+	@$(BIN)/python -m forest.warm
+	@$(BIN)/python -m pytest -n 2 --dist loadfile
+
+test-stand: $(READY)  ## tests on whole stands (minutes)
+	@$(BIN)/python -m forest.warm
+	@$(BIN)/python -m pytest -m stand
+
+bench: $(READY)  ## benchmarks: cost per metamer, voxel and year
+	@$(BIN)/python -m forest.warm
+	@$(BIN)/python -m pytest -m bench -s
+
+lint: $(READY)  ## style, types, and the direction of imports
+	@$(BIN)/ruff check --quiet $(SOURCES)
+	@$(BIN)/ruff format --check --quiet $(SOURCES) || { echo "not formatted: make format"; exit 1; }
+	@$(BIN)/mypy --no-error-summary
+	@$(BIN)/lint-imports > $(VENV)/layers.log || { cat $(VENV)/layers.log; exit 1; }
+	@echo "lint: style, types and layers hold"
+
+format: $(READY)  ## format the sources in place
+	@$(BIN)/ruff check --quiet --fix $(SOURCES)
+	@$(BIN)/ruff format --quiet $(SOURCES)
+
+docs: $(READY)  ## build the documentation in docs/_build/html
+	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	@echo "docs: docs/_build/html/index.html"
+
+clean:  ## remove what was built, but not .venv
+	@rm -rf out dist docs/_build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -1,0 +1,42 @@
+"""What every test relies on: two threads, pictures off screen, reproducible properties.
+
+The environment is set before numba, matplotlib or VTK are imported.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+from hypothesis import settings
+
+os.environ.setdefault("NUMBA_NUM_THREADS", "2")
+os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
+os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+settings.register_profile("here", deadline=None, max_examples=30)
+settings.register_profile("ci", settings.get_profile("here"), derandomize=True, database=None)
+settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+
+def _take_own_cache(worker: str) -> None:
+    """Give a test worker its own copy of the kernel cache.
+
+    Two processes that add different signatures to one cache can leave an index that names the
+    other's code. A worker therefore writes only to its own folder, which starts as a copy of the
+    cache that `forest.warm` filled.
+    """
+    base = os.environ.get("FOREST_CACHE") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    shared = Path(base).expanduser() / "forest-kernels"
+    os.environ["FOREST_CACHE"] = str(shared.parent / "forest-kernels-tests" / worker)
+    from forest._jit import CACHE, is_cold
+
+    warm = shared / CACHE.name
+    if is_cold() and warm.is_dir():
+        shutil.copytree(warm, CACHE, dirs_exist_ok=True)
+
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    _take_own_cache(os.environ["PYTEST_XDIST_WORKER"])
