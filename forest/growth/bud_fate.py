@@ -21,15 +21,13 @@ _NO_ROOM_LATERAL = 64
 
 
 @njit
-def gather_light(parent, state, light, order, max_order, q_main, q_side):  # type: ignore[no-untyped-def]
+def gather_light(parent, state, light, q_main, q_side):  # type: ignore[no-untyped-def]
     """Sum the light Q of buds basipetally (first pass of 4.2); one backward scan.
 
     Parameters
     ----------
-    parent, state, light, order : arrays (n,)
+    parent, state, light : arrays (n,)
         One tree's extent of the arena.
-    max_order : int
-        Axes of this order bear leaves but no branches: their lateral buds count, unfed.
     q_main, q_side : float64 (n,)
         Filled: light of the continuing axis (Q_m) and of the branch (Q_l) at each node.
 
@@ -55,7 +53,7 @@ def gather_light(parent, state, light, order, max_order, q_main, q_side):  # typ
 
 @njit
 def share_borchert_honda(  # type: ignore[no-untyped-def]
-    parent, state, order, q_main, q_side, weights, bias, v_base, v_main, v_side
+    parent, state, order, q_main, q_side, weights, bias, max_order, v_base, v_main, v_side
 ):
     """Share the resource by the extended Borchert-Honda model; one forward scan (4.2, Fig. 8a).
 
@@ -67,6 +65,8 @@ def share_borchert_honda(  # type: ignore[no-untyped-def]
         Factors on Q_m and Q_l (ones, or the mean growth rates of `balance`).
     bias : float64 (orders,)
         lambda of each order; the last holds for higher orders.
+    max_order : int
+        Lateral buds on axes of this order bear leaves (their light counts) but get nothing.
     v_base : float
         Resource at the base, alpha Q_base.
     """
@@ -82,6 +82,8 @@ def share_borchert_honda(  # type: ignore[no-untyped-def]
         lam = bias[min(np.int64(order[i]), last)]
         main = lam * q_main[i] * weights[0, i]
         side = (1.0 - lam) * q_side[i] * weights[1, i]
+        if order[i] >= max_order and state[i] & _LATERAL:
+            side = 0.0
         total = main + side
         if total > 0.0:
             v_main[i] = v * (main / total)
@@ -101,8 +103,36 @@ def _weight(position, n, w_max, w_min, kappa):  # type: ignore[no-untyped-def]
 
 
 @njit
+def _sort_by_light(items, count, mean_light):  # type: ignore[no-untyped-def]
+    """Sort the first `count` items by falling mean light; equals keep their order."""
+    if count > 24:
+        by_light = np.argsort(-mean_light[items[:count]], kind="mergesort")
+        items[:count] = items[:count][by_light]
+        return
+    for k in range(1, count):
+        item = items[k]
+        j = k
+        while j > 0 and mean_light[items[j - 1]] < mean_light[item]:
+            items[j] = items[j - 1]
+            j -= 1
+        items[j] = item
+
+
+@njit
 def share_priority(  # type: ignore[no-untyped-def]
-    parent, state, order, q_main, q_side, weights, control, shape, v_base, v_main, v_side, ints
+    parent,
+    state,
+    order,
+    q_main,
+    q_side,
+    weights,
+    control,
+    shape,
+    max_order,
+    v_base,
+    v_main,
+    v_side,
+    ints,
 ):
     """Share the resource by the priority model, axis by axis (4.2, Fig. 8b, 8c).
 
@@ -147,7 +177,8 @@ def share_priority(  # type: ignore[no-untyped-def]
             s = state[i]
             v_main[i] = 0.0
             v_side[i] = 0.0
-            if s & (_LATERAL | _BRANCHED) and q_side[i] > 0.0:
+            fed = s & _BRANCHED or (s & _LATERAL and order[i] < max_order)
+            if fed and q_side[i] > 0.0:
                 items[count] = i
                 count += 1
             tip = i
@@ -161,16 +192,15 @@ def share_priority(  # type: ignore[no-untyped-def]
                 number = max(1, buds[j] - on_main)
             v_side[j] = q_side[j] / number
         has_tip = state[tip] & _TERMINAL and q_main[tip] > 0.0
-        key = v_side[items[:count]]
-        by_light = np.argsort(-key, kind="mergesort")
+        _sort_by_light(items, count, v_side)
         total_items = count + (1 if has_tip else 0)
         tip_place = 0
         if has_tip and not control[min(np.int64(order[head]), last)] > 0.0:
-            while tip_place < count and key[by_light[tip_place]] >= q_main[tip]:
+            while tip_place < count and v_side[items[tip_place]] >= q_main[tip]:
                 tip_place += 1
         total = 0.0
         for k in range(count):
-            j = items[by_light[k]]
+            j = items[k]
             place = k + 1 if has_tip and k >= tip_place else k
             share = q_side[j] * weights[1, j] * _weight(place, total_items, w_max, w_min, kappa)
             v_side[j] = share

@@ -1,0 +1,120 @@
+"""Branches that earn too little for their size are dropped: Palubicki et al. 2009, section 4.4.
+
+The light gathered by a branch is compared with its size in internodes (Takenaka 1994). In
+mass-balance mode a part without a living site is dropped as well, whatever its light.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forest._jit import njit
+from forest.trees.metamers import Metamers
+
+_MAIN = 1
+_TERMINAL = 2
+_LATERAL = 4
+_BRANCHED = 8
+_CONTINUED = 16
+
+
+@njit
+def mark_shed(  # type: ignore[no-untyped-def]
+    parent, state, light, sapwood, order, threshold, drop_bare, branch_pipe, gathered, loss, ints
+):
+    """Mark what a tree sheds, tell the nodes that bore it, and take its pipes out of the sapwood.
+
+    Parameters
+    ----------
+    threshold : float
+        Light per internode below which a branch is shed; 0 sheds nothing.
+    drop_bare : bool
+        Whether parts without a living site are dropped.
+    branch_pipe : float
+        Thickness of a pipe along branches relative to the stem (kappa).
+    gathered, loss : float64 (n,)
+        Scratch: light of each part; sapwood (as on the stem) that served what was shed.
+    ints : int32 (3, n)
+        Scratch; `ints[2]` is filled with 1 for metamers that go, 0 for those that stay.
+
+    Returns
+    -------
+    int
+        Metamers that go.
+    """
+    n = len(parent)
+    internodes, sites, gone = ints[0], ints[1], ints[2]
+    for i in range(n):
+        s = state[i]
+        buds = (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
+        gathered[i] = buds * np.float64(light[i])
+        sites[i] = buds
+        internodes[i] = 1
+        loss[i] = 0.0
+        gone[i] = 0
+    for i in range(n - 1, 0, -1):
+        p = parent[i]
+        gathered[p] += gathered[i]
+        sites[p] += sites[i]
+        internodes[p] += internodes[i]
+    shed = 0
+    for i in range(1, n):
+        p = parent[i]
+        if gone[p]:
+            gone[i] = 1
+            shed += 1
+            continue
+        poor = not state[i] & _MAIN and gathered[i] < threshold * internodes[i]
+        if poor or (drop_bare and sites[i] == 0):
+            gone[i] = 1
+            shed += 1
+            loss[p] += np.float64(sapwood[i]) / (branch_pipe if order[i] > 0 else 1.0)
+            if state[i] & _MAIN:
+                state[p] &= np.uint8(255 - _CONTINUED)
+            else:
+                state[p] &= np.uint8(255 - _BRANCHED)
+    if shed > 0:
+        for i in range(n - 1, -1, -1):
+            if gone[i]:
+                continue
+            here = loss[i] * (branch_pipe if order[i] > 0 else 1.0)
+            sapwood[i] = np.float32(max(0.0, np.float64(sapwood[i]) - here))
+            if i > 0:
+                loss[parent[i]] += loss[i]
+    return shed
+
+
+@njit
+def close_ranks(arena: Metamers, start, n, gone, new_index):  # type: ignore[no-untyped-def]
+    """Compact a tree inside its extent: move what stays to the front, in order.
+
+    Returns the number of metamers that stay.
+    """
+    kept = 0
+    for i in range(n):
+        if gone[i]:
+            new_index[i] = -1
+            continue
+        new_index[i] = kept
+        if kept != i:
+            a = start + i
+            b = start + kept
+            p = arena.parent[a]
+            arena.parent[b] = new_index[p] if p >= 0 else -1
+            arena.serial[b] = arena.serial[a]
+            for k in range(3):
+                arena.tip[b, k] = arena.tip[a, k]
+                arena.bud[b, k] = arena.bud[a, k]
+            arena.length[b] = arena.length[a]
+            arena.pipe[b] = arena.pipe[a]
+            arena.sapwood[b] = arena.sapwood[a]
+            arena.light[b] = arena.light[a]
+            arena.resource[b, 0] = arena.resource[a, 0]
+            arena.resource[b, 1] = arena.resource[a, 1]
+            arena.birth[b] = arena.birth[a]
+            arena.order[b] = arena.order[a]
+            arena.state[b] = arena.state[a]
+            arena.deficit[b] = arena.deficit[a]
+            arena.shoot_height[b] = arena.shoot_height[a]
+        kept += 1
+    return kept
