@@ -61,9 +61,8 @@ def growth_shares(  # type: ignore[no-untyped-def]
         q = buds * np.float64(light[i])
         limb_light[head[i]] += q
         all_light += q
-        total[i] = np.float64(i)  # for a head: the last metamer of its axis, set below
     for i in range(n):
-        total[head[i]] = np.float64(i)
+        total[head[i]] = np.float64(i)  # the last metamer of each axis
     centre_x = moment_x / mass if mass > 0.0 else 0.0
     centre_y = moment_y / mass if mass > 0.0 else 0.0
     ell = max(offset_length * 0.5 * np.sqrt(np.float64(pipe[0])), 1e-6)

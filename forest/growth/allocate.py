@@ -1,0 +1,316 @@
+"""Allocate: each bud learns how many metamers it may make and how long they are.
+
+One driver runs over the trees; what happens to one tree reads from top to bottom in
+`_allocate_balanced` (mass balance) and `_allocate_paper` (Palubicki's v_base = alpha Q_base).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from forest import random
+from forest._jit import njit, njit_parallel
+from forest.growth.balance import growth_shares
+from forest.growth.bud_fate import gather_light, share_borchert_honda, share_priority
+from forest.growth.budget import (
+    INCOME,
+    LEAVES,
+    RESERVE_CHANGE,
+    SPEND,
+    UPKEEP,
+    affordable_scale,
+    path_lengths,
+    site_income,
+)
+from forest.growth.curves import curve
+from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
+from forest.growth.parameters import (
+    LENGTH_BY_ORDER,
+    MAX_ORDERS,
+    SHOOTS_BY_HEIGHT,
+    SHOOTS_BY_ORDER,
+    SHOOTS_BY_PARENT_LENGTH,
+    SpeciesTraits,
+    Year,
+)
+from forest.random import STREAM_ABORT, STREAM_FATE
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
+
+_TERMINAL = 2
+_LATERAL = 4
+
+
+@njit
+def income_rate(traits, sp, vigour, year):  # type: ignore[no-untyped-def]
+    """Income of one site of a species in full light at the ground, kg a year."""
+    return (
+        traits.light_use[sp] * traits.leaf_area[sp] * vigour * year.income_factor / year.full_light
+    )
+
+
+@njit
+def unit_costs(traits, sp):  # type: ignore[no-untyped-def]
+    """Cost (kg) and length (m) of one new metamer by order: primary wood and first leaves."""
+    units = np.empty((MAX_ORDERS, 2))
+    wood = traits.density[sp] * 0.25 * np.pi * traits.twig_diameter[sp] ** 2
+    for o in range(MAX_ORDERS):
+        factor = curve(
+            traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, np.float64(o)
+        )
+        units[o, 1] = traits.internode_length[sp] * factor
+        units[o, 0] = wood * units[o, 1] + traits.leaf_mass[sp]
+    return units
+
+
+@njit
+def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-untyped-def]
+    """Share v_base among the buds by the scenario's bud-fate model."""
+    parent, state, order, tip, length, pipe, light = parts
+    n = len(parent)
+    q_main, q_side, v_main, v_side = work[0], work[1], work[2], work[3]
+    weights = work[6:8]
+    if year.balance:
+        traits = (
+            t.density[sp],
+            t.min_growth[sp],
+            t.offset_gain[sp],
+            t.light_gain[sp],
+            t.offset_length[sp],
+        )
+        growth_shares(
+            parent, state, tip, length, pipe, light, traits, weights, work[8:11], ints[0:2]
+        )
+    else:
+        for i in range(n):
+            weights[0, i] = 1.0
+            weights[1, i] = 1.0
+    control = np.empty(MAX_ORDERS)
+    if year.priority:
+        for o in range(MAX_ORDERS):
+            control[o] = 1.0 if age < t.apical_until[sp, o] else 0.0
+        share_priority(
+            parent,
+            state,
+            order,
+            q_main,
+            q_side,
+            weights,
+            control,
+            (t.w_max[sp], t.w_min[sp], t.kappa[sp]),
+            t.max_order[sp],
+            v_base,
+            v_main,
+            v_side,
+            ints,
+        )
+    else:
+        for o in range(MAX_ORDERS):
+            control[o] = t.apical_bias[sp] if age < t.apical_until[sp, o] else 0.5
+        share_borchert_honda(
+            parent,
+            state,
+            order,
+            q_main,
+            q_side,
+            weights,
+            control,
+            t.max_order[sp],
+            v_base,
+            v_main,
+            v_side,
+        )
+
+
+@njit
+def _shoots(t, sp, year, tree_id, serial, height, order, length):  # type: ignore[no-untyped-def]
+    """Taylor-Hell 3.1: a bud shoots if f1(height in year) f2(order) f3(parent length) R > 1."""
+    product = curve(t.curve_n, t.curve_x, t.curve_y, sp, SHOOTS_BY_HEIGHT, height / 255.0)
+    product *= curve(t.curve_n, t.curve_x, t.curve_y, sp, SHOOTS_BY_ORDER, np.float64(order))
+    product *= curve(
+        t.curve_n, t.curve_x, t.curve_y, sp, SHOOTS_BY_PARENT_LENGTH, np.float64(length)
+    )
+    r, _, _, _ = random.uniforms(year.seed, STREAM_FATE, tree_id, serial, year.step)
+    return product * r > 1.0
+
+
+@njit
+def _has_shoot_curves(t, sp):  # type: ignore[no-untyped-def]
+    return (
+        t.curve_n[sp, SHOOTS_BY_HEIGHT]
+        + t.curve_n[sp, SHOOTS_BY_ORDER]
+        + t.curve_n[sp, SHOOTS_BY_PARENT_LENGTH]
+        > 0
+    )
+
+
+@njit
+def _hold_back(arena, s, e, t, sp, year, tree_id):  # type: ignore[no-untyped-def]
+    """Let the user-drawn curves keep lateral buds from shooting this year."""
+    for i in range(s, e):
+        v = arena.resource[i, 1]
+        if v < 1.0 or not arena.state[i] & _LATERAL:
+            continue
+        order = np.int64(arena.order[i]) + 1
+        if not _shoots(
+            t, sp, year, tree_id, arena.serial[i], arena.shoot_height[i], order, arena.length[i]
+        ):
+            arena.resource[i, 1] = v - np.floor(v)
+
+
+@njit
+def _allocate_paper(arena, trees, row, t, year, work, ints):  # type: ignore[no-untyped-def]
+    """Palubicki 4.2: v_base = alpha Q_base."""
+    s = trees.start[row]
+    n = trees.size[row]
+    e = s + n
+    sp = trees.species[row]
+    parts = (
+        arena.parent[s:e],
+        arena.state[s:e],
+        arena.order[s:e],
+        arena.tip[s:e],
+        arena.length[s:e],
+        arena.pipe[s:e],
+        arena.light[s:e],
+    )
+    q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
+    age = np.float64(year.step - trees.birth[row])
+    _share(t, sp, age, year, parts, t.alpha[sp] * q_base, work, ints)
+    for i in range(n):
+        arena.resource[s + i, 0] = work[2, i] if arena.state[s + i] & _TERMINAL else 0.0
+        arena.resource[s + i, 1] = work[3, i] if arena.state[s + i] & _LATERAL else 0.0
+    if _has_shoot_curves(t, sp):
+        _hold_back(arena, s, e, t, sp, year, trees.tree_id[row])
+
+
+@njit
+def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # type: ignore[no-untyped-def]
+    """Book the sites' income and costs; sites that do not pay for some years abort.
+
+    Returns income, leaf cost and upkeep of the tree, kg.
+    """
+    income = 0.0
+    leaves = 0.0
+    upkeep = 0.0
+    leaf = t.leaf_mass[sp] / t.leaf_lifespan[sp]
+    to_volume = 0.25 * np.pi * t.density[sp]
+    minimal = to_volume * t.first_pipe[sp] ** 2
+    retention = t.leaf_retention[sp]
+    for k in range(n):
+        i = s + k
+        upkeep += np.float64(arena.sapwood[i]) * np.float64(arena.length[i])
+        state = arena.state[i]
+        sites = (1 if state & _TERMINAL else 0) + (1 if state & _LATERAL else 0)
+        if sites == 0:
+            continue
+        earned = site_income(np.float64(arena.light[i]), path[k], rate, t.hydraulic_length[sp])
+        income += sites * earned
+        leaves += sites * leaf
+        if earned < leaf + minimal * pipe_path[k]:
+            arena.deficit[i] = np.uint8(min(255, np.int64(arena.deficit[i]) + 1))
+            if arena.deficit[i] > t.deficit_years[sp]:
+                draw, other, _, _ = random.uniforms(
+                    year.seed, STREAM_ABORT, tree_id, arena.serial[i], year.step
+                )
+                if state & _TERMINAL and draw < t.abortion[sp]:
+                    arena.state[i] &= np.uint8(255 - _TERMINAL)
+                if state & _LATERAL and other < t.abortion[sp]:
+                    arena.state[i] &= np.uint8(255 - _LATERAL)
+        else:
+            arena.deficit[i] = 0
+        if retention > 0.0 and year.step - arena.birth[i] >= retention:
+            arena.state[i] &= np.uint8(255 - _LATERAL)
+    return income, leaves, t.maintenance[sp] * to_volume * upkeep
+
+
+@njit
+def _allocate_balanced(arena, trees, row, t, year, accounts, work, ints):  # type: ignore[no-untyped-def]
+    """The annual mass balance of one tree: income, leaves, upkeep, spend, and what buds may make."""
+    s = trees.start[row]
+    n = trees.size[row]
+    e = s + n
+    sp = trees.species[row]
+    parts = (
+        arena.parent[s:e],
+        arena.state[s:e],
+        arena.order[s:e],
+        arena.tip[s:e],
+        arena.length[s:e],
+        arena.pipe[s:e],
+        arena.light[s:e],
+    )
+    path, pipe_path = work[4], work[5]
+    path_lengths(parts[0], parts[2], parts[4], t.branch_pipe[sp], path, pipe_path)
+    rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
+    income, leaves, upkeep = _keep_sites(
+        arena, s, n, t, sp, year, trees.tree_id[row], rate, path, pipe_path
+    )
+    have = trees.reserve[row] + income - leaves - upkeep
+    spend = (1.0 - t.reserve_fraction[sp]) * max(have, 0.0)
+    accounts[row, INCOME] = income
+    accounts[row, LEAVES] = leaves
+    accounts[row, UPKEEP] = upkeep
+    accounts[row, SPEND] = spend
+    accounts[row, RESERVE_CHANGE] = have - spend - trees.reserve[row]
+    trees.reserve[row] = have - spend
+    poor = income - leaves - upkeep < t.suppression_ratio[sp] * income or income <= 0.0
+    trees.bad_years[row] = trees.bad_years[row] + 1 if poor else 0
+
+    q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
+    age = np.float64(year.step - trees.birth[row])
+    _share(t, sp, age, year, parts, t.alpha[sp] * q_base / year.full_light, work, ints)
+    for i in range(n):
+        if not arena.state[s + i] & _TERMINAL:
+            work[2, i] = 0.0
+        if not arena.state[s + i] & _LATERAL:
+            work[3, i] = 0.0
+    resource = arena.resource[s:e]
+    pipe_cost = 0.25 * np.pi * t.density[sp] * t.first_pipe[sp] ** 2
+    scale = affordable_scale(
+        resource,
+        work[2],
+        work[3],
+        pipe_path,
+        parts[2],
+        unit_costs(t, sp),
+        pipe_cost,
+        t.branch_pipe[sp],
+        int(t.max_metamers[sp]),
+        (1.0 - t.ring_fraction[sp]) * spend,
+    )
+    for i in range(n):
+        resource[i, 0] += np.float32(scale * work[2, i])
+        resource[i, 1] += np.float32(scale * work[3, i])
+    if _has_shoot_curves(t, sp):
+        _hold_back(arena, s, e, t, sp, year, trees.tree_id[row])
+
+
+@njit_parallel
+def allocate(
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    scratch: Scratch,
+    traits: SpeciesTraits,
+    year: Year,
+    accounts,
+):  # type: ignore[no-untyped-def]
+    """Allocate the year's resource in every tree.
+
+    Sets `arena.resource` (v of each bud; in mass-balance mode with the carried fraction) and, in
+    mass-balance mode, books income, leaves, upkeep and spend in `accounts` (trees, ACCOUNTS).
+    """
+    for b in prange(BINS):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            row = shared.rows[k]
+            n = np.int64(trees.size[row])
+            f = shared.place[b] * FLOATS
+            g = shared.place[b] * INTEGERS
+            work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
+            ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
+            if year.paper:
+                _allocate_paper(arena, trees, row, traits, year, work, ints)
+            else:
+                _allocate_balanced(arena, trees, row, traits, year, accounts, work, ints)

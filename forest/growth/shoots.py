@@ -1,0 +1,395 @@
+"""Extend: buds make shoots. Palubicki et al. 2009, section 4.3.
+
+A metamer's direction is the weighted sum of its default direction, the optimal direction V found
+by the environment (weight xi) and the tropism (weight eta). Growth stops at the ground and at
+obstacles.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from forest import random
+from forest._jit import njit, njit_parallel
+from forest.environment.obstacles import Solid, solid_at
+from forest.growth.curves import curve
+from forest.growth.dealing import BINS, Deal
+from forest.growth.parameters import (
+    LENGTH_BY_ORDER,
+    TROPISM_BY_AGE,
+    TROPISM_BY_ORDER,
+    SpeciesTraits,
+    Year,
+)
+from forest.random import STREAM_PHYLLOTAXIS, STREAM_SHOOT
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
+
+_MAIN = 1
+_TERMINAL = 2
+_LATERAL = 4
+_BRANCHED = 8
+_CONTINUED = 16
+
+TERMINAL_BUD = 0
+LATERAL_BUD = 1
+_STACK = 64
+
+
+class Shoots(NamedTuple):
+    """The buds that shoot this year, in order of tree, metamer and bud.
+
+    Attributes
+    ----------
+    first : int64 (trees + 1,)
+        `first[r]:first[r + 1]` are the shoots of tree row r.
+    metamer : int32 (n,)
+        Metamer that bears the bud, relative to the tree's extent.
+    bud : uint8 (n,)
+        TERMINAL_BUD or LATERAL_BUD.
+    new : int64 (trees,)
+        Metamers that each tree can gain at most.
+    """
+
+    first: NDArray[np.int64]
+    metamer: NDArray[np.int32]
+    bud: NDArray[np.uint8]
+    new: NDArray[np.int64]
+
+
+@njit
+def _made(v, most):  # type: ignore[no-untyped-def]
+    return min(np.int64(v), most)
+
+
+@njit_parallel
+def _count(arena: Metamers, trees: Trees, shared: Deal, traits: SpeciesTraits, shoots, new):  # type: ignore[no-untyped-def]
+    for b in prange(BINS):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            row = shared.rows[k]
+            most = np.int64(traits.max_metamers[trees.species[row]])
+            buds = 0
+            metamers = 0
+            for i in range(trees.start[row], trees.start[row] + trees.size[row]):
+                for bud in range(2):
+                    if arena.resource[i, bud] >= 1.0:
+                        buds += 1
+                        metamers += _made(arena.resource[i, bud], most)
+            shoots[row] = buds
+            new[row] = metamers
+
+
+@njit_parallel
+def _list(arena: Metamers, trees: Trees, shared: Deal, first, metamer, bud_kind):  # type: ignore[no-untyped-def]
+    for b in prange(BINS):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            row = shared.rows[k]
+            at = first[row]
+            s = trees.start[row]
+            for i in range(trees.size[row]):
+                for bud in range(2):
+                    if arena.resource[s + i, bud] >= 1.0:
+                        metamer[at] = i
+                        bud_kind[at] = bud
+                        at += 1
+
+
+def shooting_buds(arena: Metamers, trees: Trees, shared: Deal, traits: SpeciesTraits) -> Shoots:
+    """List the buds whose resource makes at least one metamer: n = floor(v) >= 1 (4.2)."""
+    n = len(trees.tree_id)
+    count = np.zeros(n, np.int64)
+    new = np.zeros(n, np.int64)
+    _count(arena, trees, shared, traits, count, new)
+    first = np.zeros(n + 1, np.int64)
+    np.cumsum(count, out=first[1:])
+    metamer = np.empty(first[-1], np.int32)
+    bud = np.empty(first[-1], np.uint8)
+    _list(arena, trees, shared, first, metamer, bud)
+    return Shoots(first, metamer, bud, new)
+
+
+@njit
+def bud_heading(arena, s, i, bud):  # type: ignore[no-untyped-def]
+    """Direction of a bud: of its internode (terminal), or as phyllotaxis made it (lateral)."""
+    if bud == LATERAL_BUD:
+        return (
+            np.float64(arena.bud[s + i, 0]),
+            np.float64(arena.bud[s + i, 1]),
+            np.float64(arena.bud[s + i, 2]),
+        )
+    x = np.float64(arena.tip[s + i, 0])
+    y = np.float64(arena.tip[s + i, 1])
+    z = np.float64(arena.tip[s + i, 2])
+    p = arena.parent[s + i]
+    if p >= 0:
+        x -= arena.tip[s + p, 0]
+        y -= arena.tip[s + p, 1]
+        z -= arena.tip[s + p, 2]
+    norm = np.sqrt(x * x + y * y + z * z)
+    if norm == 0.0:
+        return 0.0, 0.0, 1.0
+    return x / norm, y / norm, z / norm
+
+
+@njit_parallel
+def headings(arena: Metamers, trees: Trees, shared: Deal, shoots: Shoots, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (n, 3) with the directions of the shooting buds."""
+    for b in prange(BINS):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            row = shared.rows[k]
+            for j in range(shoots.first[row], shoots.first[row + 1]):
+                x, y, z = bud_heading(arena, trees.start[row], shoots.metamer[j], shoots.bud[j])
+                out[j, 0] = x
+                out[j, 1] = y
+                out[j, 2] = z
+
+
+@njit
+def perpendicular(hx, hy, hz, rx, ry, rz):  # type: ignore[no-untyped-def]
+    """The unit part of r at right angles to the unit vector h (any, if there is none)."""
+    along = hx * rx + hy * ry + hz * rz
+    x = rx - along * hx
+    y = ry - along * hy
+    z = rz - along * hz
+    norm = np.sqrt(x * x + y * y + z * z)
+    if norm > 1e-6:
+        return x / norm, y / norm, z / norm
+    if abs(hx) < 0.7:
+        return perpendicular_axis(hx, hy, hz, 1.0, 0.0)
+    return perpendicular_axis(hx, hy, hz, 0.0, 1.0)
+
+
+@njit
+def perpendicular_axis(hx, hy, hz, ax, ay):  # type: ignore[no-untyped-def]
+    """The unit part of a horizontal axis at right angles to h."""
+    along = hx * ax + hy * ay
+    x = ax - along * hx
+    y = ay - along * hy
+    z = -along * hz
+    norm = np.sqrt(x * x + y * y + z * z)
+    return x / norm, y / norm, z / norm
+
+
+@njit
+def turned(hx, hy, hz, px, py, pz, angle):  # type: ignore[no-untyped-def]
+    """Turn p (at right angles to h) around h by an angle."""
+    c = np.cos(angle)
+    s = np.sin(angle)
+    return (
+        c * px + s * (hy * pz - hz * py),
+        c * py + s * (hz * px - hx * pz),
+        c * pz + s * (hx * py - hy * px),
+    )
+
+
+@njit
+def _blocked(solid, trees, row, x0, y0, z0, x1, y1, z1, voxel_m):  # type: ignore[no-untyped-def]
+    """Whether an internode would enter the ground or an obstacle (its middle and end are asked)."""
+    if z1 <= 0.0:
+        return True
+    if solid.mask.size == 1:
+        return False
+    for part in (0.5, 1.0):
+        x = trees.base_offset[row, 0] + x0 + part * (x1 - x0)
+        y = trees.base_offset[row, 1] + y0 + part * (y1 - y0)
+        z = trees.base_offset[row, 2] + z0 + part * (z1 - z0)
+        if solid_at(
+            solid,
+            trees.base_voxel[row, 0] + np.int32(np.floor(x / voxel_m)),
+            trees.base_voxel[row, 1] + np.int32(np.floor(y / voxel_m)),
+            trees.base_voxel[row, 2] + np.int32(np.floor(z / voxel_m)),
+        ):
+            return True
+    return False
+
+
+@njit
+def _add(arena, trees, row, at, p, main, hx, hy, hz, length, order, t, year, height):  # type: ignore[no-untyped-def]
+    """Write the metamer `at` of a tree: geometry, lateral bud by phyllotaxis, first state."""
+    s = trees.start[row]
+    sp = trees.species[row]
+    i = s + at
+    for k in range(3):
+        below = np.float64(arena.tip[s + p, k]) if p >= 0 else 0.0
+        arena.tip[i, k] = below + length * (hx if k == 0 else (hy if k == 1 else hz))
+    serial = trees.next_serial[row]
+    trees.next_serial[row] = serial + 1
+    a, b, _, _ = random.uniforms(year.seed, STREAM_SHOOT, trees.tree_id[row], serial, 0)
+    if main and p >= 0:
+        px, py, pz = perpendicular(
+            hx, hy, hz, arena.bud[s + p, 0], arena.bud[s + p, 1], arena.bud[s + p, 2]
+        )
+        turn = t.divergence_angle[sp] + (2.0 * a - 1.0) * t.angle_jitter[sp]
+    else:
+        px, py, pz = perpendicular(hx, hy, hz, 1.0, 0.0, 0.0)
+        u, _, _, _ = random.uniforms(year.seed, STREAM_PHYLLOTAXIS, trees.tree_id[row], serial, 0)
+        turn = 2.0 * np.pi * u
+    px, py, pz = turned(hx, hy, hz, px, py, pz, turn)
+    angle = t.branching_angle[sp] + (2.0 * b - 1.0) * t.angle_jitter[sp]
+    c = np.cos(angle)
+    d = np.sin(angle)
+    arena.bud[i, 0] = c * hx + d * px
+    arena.bud[i, 1] = c * hy + d * py
+    arena.bud[i, 2] = c * hz + d * pz
+    arena.parent[i] = p
+    arena.serial[i] = serial
+    arena.length[i] = length
+    arena.pipe[i] = 0.0
+    arena.sapwood[i] = 0.0
+    arena.light[i] = 0.0
+    arena.resource[i, 0] = 0.0
+    arena.resource[i, 1] = 0.0
+    arena.birth[i] = year.step
+    arena.order[i] = min(order, 255)
+    arena.state[i] = (_MAIN if main else 0) | _LATERAL
+    arena.deficit[i] = 0
+    arena.shoot_height[i] = height
+
+
+@njit
+def _steered(t, sp, eta, hx, hy, hz, vx, vy, vz):  # type: ignore[no-untyped-def]
+    """Default direction + xi V + eta tropism, normalized (4.3)."""
+    xi = t.light_weight[sp]
+    x = hx + xi * vx + eta * t.tropism_x[sp]
+    y = hy + xi * vy + eta * t.tropism_y[sp]
+    z = hz + xi * vz + eta * t.tropism_z[sp]
+    norm = np.sqrt(x * x + y * y + z * z)
+    if norm < 1e-9:
+        return hx, hy, hz
+    return x / norm, y / norm, z / norm
+
+
+@njit
+def _bear(arena, s, p, bud):  # type: ignore[no-untyped-def]
+    """Note on the parent that its bud has become a shoot."""
+    if bud == TERMINAL_BUD:
+        arena.state[s + p] = (arena.state[s + p] & (255 - _TERMINAL)) | _CONTINUED
+    else:
+        arena.state[s + p] = (arena.state[s + p] & (255 - _LATERAL)) | _BRANCHED
+
+
+@njit
+def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  # type: ignore[no-untyped-def]
+    """Grow all shoots of one tree at the end of its extent; new parents precede new children."""
+    s = trees.start[row]
+    sp = trees.species[row]
+    end = trees.size[row]
+    age = np.float64(year.step - trees.birth[row])
+    by_age = t.tropism_weight[sp] * curve(
+        t.curve_n, t.curve_x, t.curve_y, sp, TROPISM_BY_AGE, age
+    )
+    most = np.int64(t.max_metamers[sp])
+    bias = t.apical_bias[sp] if age < t.apical_until[sp, 0] else 0.5
+    # a sylleptic shoot branches as it grows: (parent, bud, resource) still to be grown
+    wait_p = np.empty(_STACK, np.int64)
+    wait_bud = np.empty(_STACK, np.int64)
+    wait_v = np.empty(_STACK)
+    for j in range(shoots.first[row], shoots.first[row + 1]):
+        p = np.int64(shoots.metamer[j])
+        bud = np.int64(shoots.bud[j])
+        v = np.float64(arena.resource[s + p, bud])
+        arena.resource[s + p, bud] = 0.0 if year.paper else v - np.floor(v)
+        n = _made(v, most)
+        vx, vy, vz = (
+            np.float64(toward[j, 0]),
+            np.float64(toward[j, 1]),
+            np.float64(toward[j, 2]),
+        )
+        if t.sylleptic[sp] > 0.0:
+            wait_p[0], wait_bud[0], wait_v[0] = p, bud, min(v, most + 0.999)
+            waiting = 1
+        else:
+            wait_p[0], wait_bud[0], wait_v[0] = p, bud, np.float64(n)
+            waiting = 1
+        while waiting > 0:
+            waiting -= 1
+            p, bud, left = wait_p[waiting], wait_bud[waiting], wait_v[waiting]
+            order = np.int64(arena.order[s + p]) + (1 if bud == LATERAL_BUD else 0)
+            eta = by_age * curve(
+                t.curve_n, t.curve_x, t.curve_y, sp, TROPISM_BY_ORDER, np.float64(order)
+            )
+            unit = t.internode_length[sp] * curve(
+                t.curve_n, t.curve_x, t.curve_y, sp, LENGTH_BY_ORDER, np.float64(order)
+            )
+            if year.paper and t.sylleptic[sp] == 0.0:
+                unit *= min(v / n, 2.0)  # l = v / n (4.2)
+            hx, hy, hz = bud_heading(arena, s, p, bud)
+            made = 0
+            while left >= 1.0:
+                hx, hy, hz = _steered(t, sp, eta, hx, hy, hz, vx, vy, vz)
+                x0 = np.float64(arena.tip[s + p, 0])
+                y0 = np.float64(arena.tip[s + p, 1])
+                z0 = np.float64(arena.tip[s + p, 2])
+                x1, y1, z1 = x0 + unit * hx, y0 + unit * hy, z0 + unit * hz
+                if _blocked(solid, trees, row, x0, y0, z0, x1, y1, z1, voxel_m):
+                    break
+                made += 1
+                height = np.uint8(255 * made // n) if made < n else np.uint8(255)
+                main = bud == TERMINAL_BUD or made > 1
+                _bear(arena, s, p, TERMINAL_BUD if main else LATERAL_BUD)
+                _add(
+                    arena, trees, row, end, p, main, hx, hy, hz, unit, order, t, year, height
+                )
+                p = np.int64(end)
+                end += 1
+                left -= 1.0
+                if t.sylleptic[sp] > 0.0:
+                    # all buds are equivalent: what is left goes on to both buds of the node
+                    side = (1.0 - bias) * left
+                    left = bias * left
+                    if side >= 1.0 and waiting < _STACK and order < t.max_order[sp]:
+                        wait_p[waiting], wait_bud[waiting], wait_v[waiting] = p, LATERAL_BUD, side
+                        waiting += 1
+            if made > 0 and t.sympodial[sp] == 0.0:
+                arena.state[s + p] |= np.uint8(_TERMINAL)
+    trees.size[row] = end
+
+
+@njit_parallel
+def extend(
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    shoots: Shoots,
+    toward,
+    traits: SpeciesTraits,
+    year: Year,
+    solid: Solid,
+    voxel_m,
+):  # type: ignore[no-untyped-def]
+    """Grow the shoots of all trees. Every extent must have room for `shoots.new` more metamers.
+
+    Parameters
+    ----------
+    toward : float32 (shoots, 3)
+        Optimal direction V of each shooting bud; zero where the environment has none.
+    voxel_m : float
+        Edge of the voxels of `solid`, m.
+    """
+    for b in prange(BINS):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            _extend_tree(
+                arena, trees, shared.rows[k], shoots, toward, traits, year, solid, voxel_m
+            )
+
+
+@njit
+def sprout(arena: Metamers, trees: Trees, first_row, traits: SpeciesTraits, year: Year):  # type: ignore[no-untyped-def]
+    """Give each tree from `first_row` on its first metamer: an upright internode with a terminal bud."""
+    for row in range(first_row, len(trees.tree_id)):
+        sp = trees.species[row]
+        s = trees.start[row]
+        unit = traits.internode_length[sp] * curve(
+            traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, 0.0
+        )
+        _add(
+            arena, trees, row, 0, -1, True, 0.0, 0.0, 1.0, unit, 0, traits, year, np.uint8(255)
+        )
+        arena.state[s] = _TERMINAL | _LATERAL
+        arena.pipe[s] = traits.twig_diameter[sp] ** traits.pipe_exponent[sp]
+        arena.sapwood[s] = arena.pipe[s]
+        trees.size[row] = 1
