@@ -7,9 +7,13 @@ mass-balance mode a part without a living site is dropped as well, whatever its 
 from __future__ import annotations
 
 import numpy as np
+from numba import prange
 
-from forest._jit import njit
+from forest._jit import njit, njit_parallel
+from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
+from forest.growth.parameters import SpeciesTraits
 from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
 
 _MAIN = 1
 _TERMINAL = 2
@@ -118,3 +122,41 @@ def close_ranks(arena: Metamers, start, n, gone, new_index):  # type: ignore[no-
             arena.shoot_height[b] = arena.shoot_height[a]
         kept += 1
     return kept
+
+
+@njit_parallel
+def shed(  # type: ignore[no-untyped-def]
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    scratch: Scratch,
+    traits: SpeciesTraits,
+    drop_bare,
+):
+    """Drop the branches of all trees that earn too little, and compact what stays."""
+    for b in prange(BINS):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            row = shared.rows[k]
+            sp = trees.species[row]
+            s = trees.start[row]
+            n = np.int64(trees.size[row])
+            e = s + n
+            f = shared.place[b] * FLOATS
+            g = shared.place[b] * INTEGERS
+            work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
+            ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
+            gone = mark_shed(
+                arena.parent[s:e],
+                arena.state[s:e],
+                arena.light[s:e],
+                arena.sapwood[s:e],
+                arena.order[s:e],
+                traits.shed_below[sp],
+                drop_bare,
+                traits.branch_pipe[sp],
+                work[0],
+                work[1],
+                ints,
+            )
+            if gone > 0:
+                trees.size[row] = close_ranks(arena, s, n, ints[2], ints[0])

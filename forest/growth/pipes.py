@@ -1,0 +1,205 @@
+"""Thicken: pipes with memory (Palubicki et al. 2009, section 4.5), and the year's ring.
+
+In paper mode every new leaf adds d0^n to each internode below it and nothing is ever taken away:
+d^n = d1^n + d2^n with a memory of past leaves. In mass-balance mode pipes add by area (n = 2):
+new metamers get their primary wood and first pipes, limbs too thin for their load are thickened,
+and the rest of the year's spend is laid down as pipes from the sites that earned it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from forest._jit import njit, njit_parallel
+from forest.growth.allocate import income_rate
+from forest.growth.budget import (
+    EXTENSION,
+    RESERVE_CHANGE,
+    RING,
+    SPEND,
+    path_lengths,
+    site_income,
+)
+from forest.growth.dealing import BINS, FLOATS, Deal, Scratch
+from forest.growth.parameters import SpeciesTraits, Year
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
+
+_TERMINAL = 2
+_LATERAL = 4
+
+#: k of supports(R, d) = k d R^2 from the 300-foot limit, m (Hart & Baker 2003, eq. 8).
+SUPPORT = np.pi * 30.48
+
+
+@njit
+def add_pipes(parent, birth, step, pipe, strand, flow):  # type: ignore[no-untyped-def]
+    """Lead `strand` (d0^n) from each metamer of this step to the ground; one backward scan."""
+    n = len(parent)
+    for i in range(n):
+        flow[i] = strand if birth[i] == step else 0.0
+    for i in range(n - 1, -1, -1):
+        pipe[i] = np.float32(np.float64(pipe[i]) + flow[i])
+        if i > 0:
+            flow[parent[i]] += flow[i]
+
+
+@njit
+def reinforce(parent, length, pipe, density, leaf_mass, state, budget, mass, lack):  # type: ignore[no-untyped-def]
+    """Thicken first what is thinner than its load needs (Hart & Baker 2003, eqs 6, 7, 10, 18).
+
+    needs_to_support(M, d) = sqrt(M / (k d)), asked of every metamer for the mass it carries.
+
+    Parameters
+    ----------
+    budget : float
+        Dry mass at hand, kg; the reinforcement is scaled down to it.
+    mass, lack : float64 (n,)
+        Scratch: mass supported, kg; missing d^2, m2.
+
+    Returns
+    -------
+    float
+        Dry mass laid down, kg.
+    """
+    n = len(parent)
+    volume = 0.25 * np.pi * density
+    for i in range(n):
+        s = state[i]
+        sites = (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
+        mass[i] = volume * np.float64(pipe[i]) * np.float64(length[i]) + sites * leaf_mass
+    for i in range(n - 1, 0, -1):
+        mass[parent[i]] += mass[i]
+    cost = 0.0
+    for i in range(n):
+        needed = 4.0 * mass[i] / (SUPPORT * density)
+        lack[i] = max(0.0, needed - np.float64(pipe[i]))
+        cost += volume * lack[i] * np.float64(length[i])
+    if cost <= 0.0:
+        return 0.0
+    part = min(1.0, budget / cost)
+    for i in range(n):
+        if lack[i] > 0.0:
+            pipe[i] = np.float32(np.float64(pipe[i]) + part * lack[i])
+    return part * cost
+
+
+@njit
+def lay_ring(parent, order, pipe, sapwood, branch_pipe, keep, flow):  # type: ignore[no-untyped-def]
+    """Lay down pipes from their sites to the ground; one backward scan.
+
+    Parameters
+    ----------
+    branch_pipe : float
+        Thickness along branches relative to the stem (kappa).
+    keep : float
+        Share of the sapwood that is still sapwood after the year.
+    flow : float64 (n,)
+        d^2 of the pipes that start at each node; changed to what passes it.
+    """
+    for i in range(len(parent) - 1, -1, -1):
+        here = flow[i] if order[i] == 0 else flow[i] * branch_pipe
+        pipe[i] = np.float32(np.float64(pipe[i]) + here)
+        sapwood[i] = np.float32(min(np.float64(sapwood[i]) * keep + here, np.float64(pipe[i])))
+        if i > 0:
+            flow[parent[i]] += flow[i]
+
+
+@njit
+def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: ignore[no-untyped-def]
+    """Book the extension, then lay down this year's ring out of the rest of the spend."""
+    s = trees.start[row]
+    n = trees.size[row]
+    e = s + n
+    sp = trees.species[row]
+    parent = arena.parent[s:e]
+    order = arena.order[s:e]
+    length = arena.length[s:e]
+    pipe = arena.pipe[s:e]
+    state = arena.state[s:e]
+    birth = arena.birth[s:e]
+    path, pipe_path, flow, surplus = work[0], work[1], work[2], work[3]
+    path_lengths(parent, order, length, t.branch_pipe[sp], path, pipe_path)
+    volume = 0.25 * np.pi * t.density[sp]
+    strand = t.first_pipe[sp] ** 2
+    primary = t.twig_diameter[sp] ** 2
+    rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
+    leaf = t.leaf_mass[sp] / t.leaf_lifespan[sp]
+    extension = 0.0
+    total = 0.0
+    for i in range(n):
+        flow[i] = 0.0
+        surplus[i] = 0.0
+        if birth[i] == year.step:
+            pipe[i] = primary
+            arena.sapwood[s + i] = primary
+            flow[i] = strand
+            extension += volume * (primary * np.float64(length[i]) + strand * pipe_path[i])
+            extension += t.leaf_mass[sp]
+            continue
+        sites = (1 if state[i] & _TERMINAL else 0) + (1 if state[i] & _LATERAL else 0)
+        if sites > 0:
+            earned = site_income(np.float64(arena.light[s + i]), path[i], rate, t.hydraulic_length[sp])
+            surplus[i] = sites * max(earned - leaf, 0.0)
+            total += surplus[i]
+    rest = max(accounts[row, SPEND] - extension, 0.0)
+    support = reinforce(
+        parent, length, pipe, t.density[sp], t.leaf_mass[sp], state, rest, work[4], work[5]
+    )
+    ring = rest - support
+    if total > 0.0:
+        per_surplus = ring / (volume * total)
+        for i in range(n):
+            flow[i] += per_surplus * surplus[i] / pipe_path[i]
+    else:
+        trees.reserve[row] += ring
+        accounts[row, RESERVE_CHANGE] += ring
+        ring = 0.0
+    accounts[row, EXTENSION] = extension
+    accounts[row, RING] = ring + support
+    short = extension - accounts[row, SPEND]
+    if short > 0.0:  # rounding of the search for s: a few metamers more than the spend
+        trees.reserve[row] -= short
+        accounts[row, RESERVE_CHANGE] -= short
+    lay_ring(
+        parent,
+        order,
+        pipe,
+        arena.sapwood[s:e],
+        t.branch_pipe[sp],
+        1.0 - 1.0 / t.sapwood_years[sp],
+        flow,
+    )
+
+
+@njit_parallel
+def thicken(
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    scratch: Scratch,
+    traits: SpeciesTraits,
+    year: Year,
+    accounts,
+):  # type: ignore[no-untyped-def]
+    """Thicken all trees; in mass-balance mode book extension and ring in `accounts`."""
+    for b in prange(BINS):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            row = shared.rows[k]
+            n = np.int64(trees.size[row])
+            f = shared.place[b] * FLOATS
+            work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
+            if year.paper:
+                s = trees.start[row]
+                sp = trees.species[row]
+                add_pipes(
+                    arena.parent[s : s + n],
+                    arena.birth[s : s + n],
+                    year.step,
+                    arena.pipe[s : s + n],
+                    traits.twig_diameter[sp] ** traits.pipe_exponent[sp],
+                    work[0],
+                )
+            else:
+                _thicken_balanced(arena, trees, row, traits, year, accounts, work)
