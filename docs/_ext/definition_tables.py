@@ -1,0 +1,114 @@
+"""Tables of the documentation that are written from the program's own definitions.
+
+`{scenario-keys}` and `{species-keys}` list every key with unit, default, range and meaning;
+`{species-values}` sets the shipped species side by side.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+import forest
+from forest.scenario import Scenario
+from forest.species import Species, describe, load_species, species_names
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Write a table in Markdown."""
+    lines = [header, ["--"] * len(header), *rows]
+    return "".join(
+        "| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |\n" for line in lines
+    )
+
+
+def keys_by_table(model: Any) -> str:
+    """List the keys of a model, one Markdown table for each table of the file."""
+    text = ""
+    rows = describe(model)
+    for table, group in groupby(rows, key=lambda row: row.key.rpartition(".")[0]):
+        title = f"`[{table}]`" if table else "Top level"
+        text += f"### {title}\n\n" + markdown_table(
+            ["key", "type", "unit", "default", "range", "meaning"],
+            [
+                [
+                    f"`{row.key.rpartition('.')[2]}`",
+                    row.type,
+                    "" if row.unit == "1" else row.unit,
+                    f"`{row.default}`" if row.default not in ("", "required") else row.default,
+                    row.range,
+                    row.description,
+                ]
+                for row in group
+            ],
+        )
+        text += "\n"
+    return text
+
+
+def values_side_by_side() -> str:
+    """Set the parameters of the shipped species side by side."""
+    species = [load_species(name) for name in species_names()]
+    rows = []
+    for row in describe(Species):
+        section, _, key = row.key.rpartition(".")
+        if not section or "." in section or section.startswith("sources"):
+            continue
+        values = [getattr(getattr(s, section), key) for s in species]
+        rows.append([f"`{row.key}`", *(_short(value) for value in values)])
+    return markdown_table(["parameter", *(s.common_name for s in species)], rows)
+
+
+def sources() -> str:
+    """List where the values of each shipped species come from."""
+    folder = Path(forest.__file__).parent / "species"
+    text = ""
+    for name in species_names():
+        table = tomllib.loads((folder / f"{name}.toml").read_text())
+        text += f"### {load_species(name).common_name}\n\n"
+        text += markdown_table(["parameter", "source"], _flat(table["sources"]))
+        text += "\n"
+    return text
+
+
+def _flat(table: dict[str, Any], prefix: str = "") -> Iterable[list[str]]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield [f"`{prefix}{key}`", str(value)]
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, tuple):
+        return ", ".join(_short(item) for item in value) or "–"
+    return str(value)
+
+
+def _directive(text: Any) -> type[SphinxDirective]:
+    class Generated(SphinxDirective):
+        def run(self) -> list[nodes.Node]:
+            for module in ("scenario", "species"):
+                for source in (Path(forest.__file__).parent / module).iterdir():
+                    self.env.note_dependency(str(source))
+            return self.parse_text_to_nodes(text(), allow_section_headings=True)
+
+    return Generated
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the directives with Sphinx."""
+    app.add_directive("scenario-keys", _directive(lambda: keys_by_table(Scenario)))
+    app.add_directive("species-keys", _directive(lambda: keys_by_table(Species)))
+    app.add_directive("species-values", _directive(values_side_by_side))
+    app.add_directive("species-sources", _directive(sources))
+    return {"parallel_read_safe": True}
