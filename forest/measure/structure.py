@@ -33,7 +33,7 @@ def gini(sizes: NDArray[np.float64]) -> float:
 
 
 def _shares(amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-    return amounts[amounts > 0.0] / amounts.sum()
+    return np.asarray(amounts[amounts > 0.0] / amounts.sum(), np.float64)
 
 
 def shannon(amounts: NDArray[np.float64]) -> float:

@@ -100,7 +100,7 @@ def _measure_tree(
     height = 0.0
     crown_base = np.inf
     light = 0.0
-    buds = 0
+    buds = np.int64(0)
     wood = 0.0  # sum of d^2 * length
     stem = -1  # last metamer of the stem so far
     stem_goes_on = False

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.trees.metamers import LATERAL, MAIN, TERMINAL, Metamers
+from forest.trees.table import Trees
+
 
 @dataclass(frozen=True)
 class Skeleton:
@@ -56,3 +59,64 @@ class Skeleton:
     def length(self) -> NDArray[np.float64]:
         """Length of each internode, m."""
         return np.asarray(np.linalg.norm(self.end - self.start, axis=1), dtype=np.float64)
+
+
+def _number_axes(parent: NDArray[np.int32], main: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Number the axes in order of their first metamer; the base starts axis 0."""
+    starts = ~main
+    starts[:1] = True
+    index = np.arange(len(parent))
+    first = np.where(starts, index, parent)
+    while True:  # doubles the reach each time
+        further = first[first]
+        if np.array_equal(further, first):
+            break
+        first = further
+    number = np.cumsum(starts) - 1
+    return np.asarray(number[first], dtype=np.int32)
+
+
+def skeleton_of(
+    metamers: Metamers,
+    trees: Trees,
+    row: int,
+    *,
+    species: str,
+    pipe_exponent: float,
+    start_year: int,
+) -> Skeleton:
+    """Take one tree's shape out of the arena.
+
+    Parameters
+    ----------
+    metamers, trees : Metamers, Trees
+        The arena and the tree table.
+    row : int
+        The tree's row in the table.
+    species : str
+        Name of its species.
+    pipe_exponent : float
+        n of its pipe model: diameter = pipe^(1/n).
+    start_year : int
+        Calendar year of step 0, from which `birth` is counted.
+    """
+    here = slice(int(trees.start[row]), int(trees.start[row]) + int(trees.size[row]))
+    parent = metamers.parent[here].copy()
+    state = metamers.state[here]
+    base = np.array([trees.x[row], trees.y[row], 0.0])
+    end = base + metamers.tip[here].astype(np.float64)
+    start = end[parent]
+    start[parent < 0] = base
+    return Skeleton(
+        parent=parent,
+        start=start,
+        end=end,
+        radius=0.5 * metamers.pipe[here].astype(np.float64) ** (1.0 / pipe_exponent),
+        axis=_number_axes(parent, (state & MAIN) != 0),
+        order=metamers.order[here].astype(np.int32),
+        birth_year=start_year + metamers.birth[here].astype(np.int32),
+        leafy=(state & (TERMINAL | LATERAL)) != 0,
+        serial=metamers.serial[here].copy(),
+        tree_id=int(trees.tree_id[row]),
+        species=species,
+    )
