@@ -54,7 +54,9 @@ class Architecture(Table):
         "proleptic", "lateral buds shoot a year later (proleptic) or at once (sylleptic)", unit=""
     )
     axis: Literal["monopodial", "sympodial"] = quantity(
-        "monopodial", "the terminal bud goes on (monopodial) or flowers and dies (sympodial)", unit=""
+        "monopodial",
+        "the terminal bud goes on (monopodial) or flowers and dies (sympodial)",
+        unit="",
     )
     internode_factor_by_order: Curve = quantity(
         (), "factor of the internode length by order (Taylor-Hell 2005, 3.1)"
@@ -62,9 +64,7 @@ class Architecture(Table):
     shoots_by_height_in_year: Curve = quantity(
         (), "f1: a bud's readiness by its place in the year's shoot, 0..1 (Taylor-Hell 2005, 3.1)"
     )
-    shoots_by_order: Curve = quantity(
-        (), "f2: a bud's readiness by order (Taylor-Hell 2005, 3.1)"
-    )
+    shoots_by_order: Curve = quantity((), "f2: a bud's readiness by order (Taylor-Hell 2005, 3.1)")
     shoots_by_parent_length: Curve = quantity(
         (), "f3: a bud's readiness by the parent shoot's length in m (Taylor-Hell 2005, 3.1)"
     )
@@ -98,9 +98,7 @@ class BudFate(Table):
 class Shoots(Table):
     """Which way shoots grow (4.3) and how buds feel for space (4.1)."""
 
-    light_weight: float = quantity(
-        0.4, "weight of the best direction of growth (xi)", ge=0, le=10
-    )
+    light_weight: float = quantity(0.4, "weight of the best direction of growth (xi)", ge=0, le=10)
     tropism_weight: float = quantity(0.1, "weight of the tropism (eta)", ge=-10, le=10)
     tropism_direction: Direction = quantity((0.0, 0.0, 1.0), "direction of the tropism, z up")
     tropism_factor_by_age: Curve = quantity((), "factor of the tropism by the tree's age in years")
@@ -119,7 +117,9 @@ class Shoots(Table):
     def _has_direction(self) -> Shoots:
         if not any(self.tropism_direction):
             raise Refusal(
-                "a direction of length 0", key="tropism_direction", expected="a vector, e.g. [0, 0, 1]"
+                "a direction of length 0",
+                key="tropism_direction",
+                expected="a vector, e.g. [0, 0, 1]",
             )
         return self
 
@@ -171,9 +171,7 @@ class Carbon(Table):
     maintenance_per_year: float = quantity(
         0.01, "upkeep as a share of the sapwood's mass", unit="1/year", ge=0, le=1
     )
-    sapwood_years: float = quantity(
-        25.0, "rings that are sapwood (tau)", unit="year", ge=1, le=500
-    )
+    sapwood_years: float = quantity(25.0, "rings that are sapwood (tau)", unit="year", ge=1, le=500)
     reserve_fraction: float = quantity(
         0.3, "share of what a tree has that it keeps as reserve (beta)", ge=0, le=0.95
     )
@@ -201,7 +199,11 @@ class Carbon(Table):
         5, "bad years in a row after which a tree dies", unit="year", ge=1, le=200
     )
     deficit_years: int = quantity(
-        2, "years in a row that a site may fail to pay before it may abort", unit="year", ge=1, le=200
+        2,
+        "years in a row that a site may fail to pay before it may abort",
+        unit="year",
+        ge=1,
+        le=200,
     )
     abortion_probability: float = quantity(
         0.2, "chance a year that a site which does not pay aborts", unit="1/year", ge=0, le=1
@@ -209,9 +211,7 @@ class Carbon(Table):
     vigour_sd: float = quantity(
         0.05, "lasting differences of income between trees, standard deviation", ge=0, le=0.5
     )
-    seed_reserve_kg: float = quantity(
-        0.001, "reserve of a seedling", unit="kg", gt=0, le=10
-    )
+    seed_reserve_kg: float = quantity(0.001, "reserve of a seedling", unit="kg", gt=0, le=10)
 
 
 class Balance(Table):
@@ -228,9 +228,7 @@ class Balance(Table):
 class Mensuration(Table):
     """How foresters measure the species."""
 
-    bark_factor: float = quantity(
-        0.05, "double bark thickness per dbh over bark", ge=0, le=0.5
-    )
+    bark_factor: float = quantity(0.05, "double bark thickness per dbh over bark", ge=0, le=0.5)
     merchantable_top_cm: float = quantity(
         7.0, "diameter over bark down to which a stem is merchantable", unit="cm", ge=0, le=100
     )
@@ -256,9 +254,7 @@ class Species(Table):
     Shipped species are read by `load_species`; a scenario may override any parameter.
     """
 
-    name: str = quantity(
-        ..., "name in scenarios and tables", unit="", min_length=1, max_length=60
-    )
+    name: str = quantity(..., "name in scenarios and tables", unit="", min_length=1, max_length=60)
     common_name: str = quantity("", "common name", unit="", max_length=60)
     group: Literal["conifer", "broadleaf"] = quantity("conifer", "kind of tree", unit="")
     architecture: Architecture = Architecture()

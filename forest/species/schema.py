@@ -136,7 +136,9 @@ def refusal(error: ValidationError, model: type[BaseModel], *, where: str) -> In
         return InputError(own.what, where=_join(where, key), expected=own.expected)
     if first["type"] == "extra_forbidden":
         hint = nearest(str(first["loc"][-1]), place.siblings)
-        return InputError(f"unknown key {first['loc'][-1]!r}, {hint}", where=_join(where, place.key))
+        return InputError(
+            f"unknown key {first['loc'][-1]!r}, {hint}", where=_join(where, place.key)
+        )
     if first["type"] == "missing":
         what = f"missing key {str(first['loc'][-1])!r}"
     elif first["type"] == "union_tag_not_found":
@@ -413,6 +415,6 @@ def _bare(key: str) -> str:
 
 def _quote(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(
-        c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped
-    ) + '"'
+    return (
+        '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    )

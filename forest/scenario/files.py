@@ -1,0 +1,123 @@
+"""The files that a scenario names: stem maps, marker clouds, meshes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from forest.errors import InputError, nearest
+from forest.species.schema import Refusal, read_text
+
+MESH_SUFFIXES = (".stl", ".obj", ".ply", ".vtp")
+_LIMIT_M = 1e5
+
+
+def _locate(file: str, context: Any) -> Path:
+    """Find a file that is named relative to the scenario's folder."""
+    folder = context["folder"] if context else Path()
+    try:
+        return folder / Path(file).expanduser()
+    except RuntimeError:
+        return folder / file
+
+
+def _rows(
+    file: str, context: Any, columns: tuple[str, ...]
+) -> Iterator[tuple[int, dict[str, str]]]:
+    """Read a CSV's rows with their line numbers; `columns` must be there."""
+    path = _locate(file, context)
+    try:
+        text = read_text(path)
+    except InputError as error:
+        raise Refusal(str(error).removeprefix(f"{path}: "), expected="a CSV file") from None
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    header: list[str] | None = None
+    try:
+        for cells in reader:
+            if not any(cell.strip() for cell in cells):
+                continue
+            if header is None:
+                header = [cell.strip() for cell in cells]
+                _check_header(file, reader.line_num, header, columns)
+            elif len(cells) != len(header):
+                raise Refusal(
+                    f"{file!r} line {reader.line_num} has {len(cells)} columns",
+                    expected=f"{len(header)} as in its header",
+                )
+            else:
+                row = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+                yield reader.line_num, row
+    except csv.Error as error:
+        raise Refusal(f"{file!r} line {reader.line_num} is not CSV: {error}") from None
+    if header is None:
+        raise Refusal(f"{file!r} is empty", expected="columns " + ", ".join(columns))
+
+
+def _check_header(file: str, line: int, header: list[str], columns: tuple[str, ...]) -> None:
+    for column in columns:
+        if column not in header:
+            there = ", ".join(header)
+            raise Refusal(
+                f"{file!r} line {line} has no column '{column}' (it has {there[:80]})",
+                expected="columns " + ", ".join(columns),
+            )
+    if len(set(header)) < len(header):
+        raise Refusal(f"{file!r} line {line} names a column twice")
+
+
+def _number(file: str, line: int, row: dict[str, str], column: str) -> float:
+    try:
+        value = float(row[column])
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= _LIMIT_M:
+        raise Refusal(
+            f"{file!r} line {line}, column '{column}': {row[column][:40]!r} is not allowed",
+            expected=f"a number, {-_LIMIT_M:g} to {_LIMIT_M:g}",
+        )
+    return value
+
+
+def read_stem_map(
+    file: str, default_species: str, context: Any
+) -> list[tuple[int, float, float, str]]:
+    """Read line number, x_m, y_m and species of every tree of a stem map."""
+    trees = []
+    for line, row in _rows(file, context, ("x_m", "y_m")):
+        x, y = (_number(file, line, row, column) for column in ("x_m", "y_m"))
+        trees.append((line, x, y, row.get("species") or default_species))
+    if not trees:
+        raise Refusal(f"{file!r} holds no tree", expected="at least one row")
+    return trees
+
+
+def read_cloud(file: str, context: Any) -> list[tuple[float, float, float]]:
+    """Read the points of a marker cloud."""
+    return [
+        (
+            _number(file, line, row, "x_m"),
+            _number(file, line, row, "y_m"),
+            _number(file, line, row, "z_m"),
+        )
+        for line, row in _rows(file, context, ("x_m", "y_m", "z_m"))
+    ]
+
+
+def find_mesh(file: str, context: Any) -> str:
+    """Check that a mesh file exists and is of a known kind; give its absolute path."""
+    path = _locate(file, context)
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise Refusal(
+            f"{file!r} is not a known kind of mesh, {nearest(path.suffix, MESH_SUFFIXES)}"
+        )
+    try:
+        there = path.is_file()
+    except (OSError, ValueError):
+        there = False
+    if not there:
+        raise Refusal(f"no such file {str(path)!r}", expected="a mesh file")
+    return str(path.absolute())

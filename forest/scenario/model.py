@@ -1,0 +1,295 @@
+"""The tables of a scenario: what a scenario file may say."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from forest.scenario import files
+from forest.species.model import Species
+from forest.species.schema import Refusal, Table, quantity
+
+Coordinate = Annotated[float, Field(ge=-1e5, le=1e5)]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+_Edge = Annotated[float, Field(ge=0.5, le=10000)]
+_Spacing = Annotated[float, Field(ge=0.05, le=10000)]
+_Extent = Annotated[float, Field(gt=0, le=1e5)]
+_Quantile = Annotated[float, Field(ge=0, le=1)]
+_Id = Annotated[int, Field(ge=0, le=2**31 - 1)]
+_TableName = Literal["trees", "stand", "events", "rings", "carbon"]
+
+
+class Plot(Table):
+    """The rectangle on which trees stand; its corner is at (0, 0)."""
+
+    size_m: tuple[_Edge, _Edge] = quantity(..., "edges along x and y", unit="m")
+    boundary: Literal["periodic", "open"] = quantity(
+        "open", "periodic: what leaves at one edge comes in at the opposite one", unit=""
+    )
+
+
+class Site(Table):
+    """Where the plot lies and how good its soil is."""
+
+    productivity: float = quantity(1.0, "factor on every tree's income", ge=0.05, le=10)
+    latitude_deg: float = quantity(
+        50.0, "geographic latitude; sets the sun's path", unit="degree", ge=-75, le=75
+    )
+
+
+class ExtremeYear(Table):
+    """One year whose weather is given."""
+
+    year: int = quantity(..., "calendar year", unit="year", ge=-100000, le=100000)
+    factor: float = quantity(..., "factor on that year's income", ge=0, le=2)
+
+
+class Weather(Table):
+    """How years differ."""
+
+    noise_sd: float = quantity(0.0, "standard deviation of the yearly factor on income", ge=0, le=1)
+    extreme_years: tuple[ExtremeYear, ...] = quantity(
+        (), "years whose factor is multiplied in", unit="", max_length=10000
+    )
+
+    @model_validator(mode="after")
+    def _each_year_once(self) -> Weather:
+        seen: set[int] = set()
+        for i, entry in enumerate(self.extreme_years):
+            if entry.year in seen:
+                raise Refusal(
+                    f"the year {entry.year} is given twice", key=f"extreme_years[{i}].year"
+                )
+            seen.add(entry.year)
+        return self
+
+
+class Growth(Table):
+    """Which rules decide the fate of buds."""
+
+    bud_fate: Literal["borchert_honda", "priority"] = quantity(
+        "borchert_honda", "how an axis shares its resource (Palubicki et al. 2009, 4.2)", unit=""
+    )
+    balance: bool = quantity(
+        False, "keep trees in balance (growth rates of Hart and Baker 2003)", unit=""
+    )
+
+
+class Shadow(Table):
+    """Light near a bud: shadow propagation (Palubicki et al. 2009, 4.1)."""
+
+    a: float = quantity(0.05, "shadow of a bud in its own voxel (a)", gt=0, le=10)
+    b: float = quantity(2.0, "a shadow weakens by this factor per layer (b)", gt=1, le=100)
+    q_max: int = quantity(6, "depth of the shadow (q_max)", unit="voxel", ge=0, le=16)
+    full_light: float = quantity(1.0, "light of an unshaded bud (C)", gt=0, le=100)
+    voxel_m: float = quantity(0.2, "edge of a voxel", unit="m", ge=0.02, le=5)
+    direction: Literal["gradient", "least_shadow"] = quantity(
+        "gradient",
+        "best direction of growth: against the shadow's gradient, or to the least shadowed "
+        "voxel of the perception volume",
+        unit="",
+    )
+
+
+class Canopy(Table):
+    """Light far above a bud: Beer-Lambert transmission through the stand's leaves."""
+
+    voxel_m: float = quantity(
+        1.0, "edge of a voxel; a whole multiple of shadow.voxel_m", unit="m", ge=0.1, le=20
+    )
+    extinction: float = quantity(0.5, "extinction coefficient (k)", ge=0, le=2)
+    sky_directions: int = quantity(17, "directions that stand for the sky", ge=1, le=256)
+    sun_positions: int = quantity(8, "positions of the sun over the season", ge=1, le=256)
+    diffuse_share: float = quantity(0.5, "share of diffuse light above the canopy", ge=0, le=1)
+
+
+class Envelope(Table):
+    """A volume to which markers are confined."""
+
+    shape: Literal["ellipsoid", "cylinder", "box"] = quantity(
+        ..., "shape; a cylinder stands upright", unit=""
+    )
+    center_m: Point = quantity(..., "centre", unit="m")
+    size_m: tuple[_Extent, _Extent, _Extent] = quantity(
+        ..., "whole extents along x, y and z", unit="m"
+    )
+
+
+class Markers(Table):
+    """Space colonization: markers of free space (Palubicki et al. 2009, 4.1)."""
+
+    spacing_m: float = quantity(
+        0.2, "edge of the cells that hold one jittered marker each", unit="m", ge=0.01, le=10
+    )
+    release: bool = quantity(
+        True,
+        "a marker is free again when the site that took it dies; false where it is not given "
+        "in paper mode",
+        unit="",
+    )
+    envelope: tuple[Envelope, ...] = quantity(
+        (), "markers exist only inside these volumes; empty = everywhere", unit="", max_length=1000
+    )
+    clouds: tuple[Point, ...] = quantity(
+        (),
+        "further markers as points, or names of CSV files with columns x_m, y_m, z_m (their "
+        "points are kept here)",
+        unit="m",
+        max_length=10_000_000,
+    )
+
+    @field_validator("clouds", mode="before")
+    @classmethod
+    def _read_clouds(cls, clouds: Any, info: ValidationInfo) -> Any:
+        if not isinstance(clouds, tuple | list):
+            return clouds
+        points: list[Any] = []
+        for cloud in clouds:
+            points += files.read_cloud(cloud, info.context) if isinstance(cloud, str) else [cloud]
+        return tuple(points)
+
+
+class Environment(Table):
+    """How buds learn of light and space; at least one of the three tables."""
+
+    shadow: Shadow | None = None
+    canopy: Canopy | None = None
+    markers: Markers | None = None
+
+    @model_validator(mode="after")
+    def _some_fit_together(self) -> Environment:
+        if self.shadow is None and self.canopy is None and self.markers is None:
+            raise Refusal("empty", expected="a table shadow, canopy or markers")
+        if self.shadow is not None and self.canopy is not None:
+            ratio = self.canopy.voxel_m / self.shadow.voxel_m
+            if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:
+                nearest_fit = max(round(ratio), 1) * self.shadow.voxel_m
+                raise Refusal(
+                    f"{self.canopy.voxel_m:g} is not a whole multiple of shadow.voxel_m = "
+                    f"{self.shadow.voxel_m:g}",
+                    key="canopy.voxel_m",
+                    expected=f"for example {nearest_fit:g}",
+                )
+        return self
+
+
+class SpeciesUse(Species):
+    """A species of the scenario: a shipped one, its overrides and its share of the mix."""
+
+    share: float = quantity(1.0, "weight in the mix of regular and random planting", ge=0, le=1e6)
+    base: str = quantity("", "shipped species it is made from; default: its own name", unit="")
+
+
+class PlantedTree(Table):
+    """One tree of an explicit planting."""
+
+    x_m: float = quantity(..., "position along x", unit="m", ge=0, le=10000)
+    y_m: float = quantity(..., "position along y", unit="m", ge=0, le=10000)
+    species: str = quantity(
+        "", "a species of the scenario; may be left out where there is one", unit=""
+    )
+
+
+class Explicit(Table):
+    """Trees at given places."""
+
+    kind: Literal["explicit"] = quantity("explicit", "kind of planting", unit="")
+    trees: tuple[PlantedTree, ...] = quantity(
+        ..., "the trees", unit="", min_length=1, max_length=1_000_000
+    )
+
+
+class StemMap(Table):
+    """Trees at the places of a CSV file; becomes an explicit planting when it is read."""
+
+    kind: Literal["stem_map"] = quantity("stem_map", "kind of planting", unit="")
+    file: str = quantity(
+        ..., "CSV with columns x_m, y_m and perhaps species; relative to the scenario", unit=""
+    )
+    species: str = quantity("", "species of rows that name none", unit="")
+
+
+class Regular(Table):
+    """Trees in rows; the species are drawn by share."""
+
+    kind: Literal["regular"] = quantity("regular", "kind of planting", unit="")
+    spacing_m: tuple[_Spacing, _Spacing] = quantity(..., "spacing along x and y", unit="m")
+
+
+class Random(Table):
+    """Trees at random; the species are drawn by share."""
+
+    kind: Literal["random"] = quantity("random", "kind of planting", unit="")
+    density_ha: float = quantity(..., "trees per hectare", unit="1/ha", gt=0, le=1e7)
+    min_distance_m: float = quantity(
+        0.0, "least distance between two trees", unit="m", ge=0, le=100
+    )
+
+
+Planting = Annotated[Explicit | StemMap | Regular | Random, Field(discriminator="kind")]
+
+
+class Box(Table):
+    """A box that blocks growth and casts shade."""
+
+    kind: Literal["box"] = quantity("box", "kind of obstacle", unit="")
+    min_m: Point = quantity(..., "lower corner", unit="m")
+    max_m: Point = quantity(..., "upper corner", unit="m")
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> Box:
+        if any(low >= high for low, high in zip(self.min_m, self.max_m, strict=True)):
+            raise Refusal(
+                f"{list(self.max_m)} is not above min_m",
+                key="max_m",
+                expected="every coordinate above that of min_m",
+            )
+        return self
+
+
+class Mesh(Table):
+    """A closed surface that blocks growth and casts shade."""
+
+    kind: Literal["mesh"] = quantity("mesh", "kind of obstacle", unit="")
+    file: str = quantity(
+        ..., "surface file (.stl, .obj, .ply or .vtp); relative to the scenario", unit=""
+    )
+
+    @field_validator("file")
+    @classmethod
+    def _exists(cls, file: str, info: ValidationInfo) -> str:
+        return files.find_mesh(file, info.context)
+
+
+Obstacle = Annotated[Box | Mesh, Field(discriminator="kind")]
+
+
+class SampleTrees(Table):
+    """Trees whose whole life is recorded."""
+
+    ids: tuple[_Id, ...] = quantity((), "tree ids", unit="", max_length=100_000)
+    dbh_quantiles: tuple[_Quantile, ...] = quantity(
+        (), "quantiles of dbh among the trees that live at `at_year`", max_length=1000
+    )
+    at_year: int | None = quantity(
+        None, "calendar year of the quantiles; default: the last year", unit="year"
+    )
+
+
+class Output(Table):
+    """What the run file holds."""
+
+    tables: tuple[_TableName, ...] = quantity(
+        ("trees", "stand", "events", "rings", "carbon"), "tables to write", unit="", max_length=5
+    )
+    sample_trees: SampleTrees = SampleTrees()
+    checkpoint_every_years: int = quantity(
+        10, "years between two checkpoints", unit="year", ge=1, le=10000
+    )
+
+    @model_validator(mode="after")
+    def _each_table_once(self) -> Output:
+        if len(set(self.tables)) < len(self.tables):
+            raise Refusal("a table is named twice", key="tables", expected="each table once")
+        return self

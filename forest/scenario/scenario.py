@@ -1,0 +1,429 @@
+"""A scenario: all that a user says about a run, checked once, at the door."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PrivateAttr, ValidationError, ValidationInfo, field_validator, model_validator
+
+from forest.errors import InputError, nearest
+from forest.scenario import files, placing
+from forest.scenario.model import (
+    Environment,
+    Explicit,
+    Growth,
+    Obstacle,
+    Output,
+    PlantedTree,
+    Planting,
+    Plot,
+    Random,
+    Regular,
+    Site,
+    SpeciesUse,
+    StemMap,
+    Weather,
+)
+from forest.species import shipped_table, species_names
+from forest.species.model import SECTIONS, Species
+from forest.species.schema import (
+    Refusal,
+    Table,
+    as_plain,
+    parse_toml,
+    quantity,
+    read_text,
+    refusal,
+    to_toml,
+)
+
+#: A periodic grid of more columns of voxels than this fits no memory.
+_MOST_COLUMNS = 250_000_000
+_OVERRIDE = "set in the scenario"
+
+
+class Scenario(Table):
+    """What to grow, where, for how long, by which rules, and what to record.
+
+    Build one with `load`, `from_toml` or from Python with the same keys, tables as dicts::
+
+        Scenario(years=10, plot={"size_m": [10, 10]}, environment={"shadow": {}},
+                 species={"pinus_sylvestris": {}}, planting={"kind": "random", "density_ha": 4000})
+
+    Files that it names (stem maps, marker clouds) are read at once, and species are completed
+    from the shipped ones, so a scenario and its `to_toml` stand for themselves.
+
+    Raises
+    ------
+    InputError
+        In one line: what is wrong, in which file and key, and what was expected.
+    """
+
+    title: str = quantity("", "what the run is about", unit="", max_length=1000)
+    years: int = quantity(..., "years to simulate", unit="year", ge=1, le=10000)
+    start_year: int = quantity(
+        2000, "calendar year of the planting", unit="year", ge=-20000, le=20000
+    )
+    seed: int = quantity(1, "seed of all random numbers", unit="", ge=0, le=2**63 - 1)
+    mode: Literal["mass_balance", "paper"] = quantity(
+        "mass_balance",
+        "mass_balance: growth costs dry mass; paper: Palubicki et al. 2009, without costs",
+        unit="",
+    )
+    plot: Plot
+    site: Site = Site()
+    weather: Weather = Weather()
+    growth: Growth = Growth()
+    environment: Environment
+    species: dict[str, SpeciesUse] = quantity(
+        ...,
+        "the species, by name; any parameter of a species may be overridden",
+        unit="",
+        min_length=1,
+        max_length=200,
+    )
+    planting: Planting
+    obstacles: tuple[Obstacle, ...] = quantity(
+        (), "what blocks growth and casts shade", unit="", max_length=10000
+    )
+    output: Output = Output()
+
+    _given: dict[str, Any] = PrivateAttr()
+    _folder: Path = PrivateAttr()
+
+    def __init__(self, /, **fields: Any) -> None:
+        self._fill(fields, where="", folder=Path.cwd())
+
+    def _fill(self, data: dict[str, Any], *, where: str, folder: Path) -> None:
+        try:
+            self.__pydantic_validator__.validate_python(
+                data, self_instance=self, context={"folder": folder}
+            )
+        except ValidationError as error:
+            raise refusal(error, type(self), where=where) from None
+        self._given = as_plain(data)
+        self._folder = folder
+
+    @classmethod
+    def _build(cls, data: dict[str, Any], *, where: str, folder: Path) -> Scenario:
+        scenario = cls.__new__(cls)
+        scenario._fill(data, where=where, folder=folder)
+        return scenario
+
+    @classmethod
+    def load(cls, path: str | Path) -> Scenario:
+        """Read a scenario file; files that it names are looked for beside it.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or is not a valid scenario.
+        """
+        path = Path(path)
+        return cls.from_toml(read_text(path), where=path.name, folder=path.parent)
+
+    @classmethod
+    def from_toml(cls, text: str, *, where: str = "scenario", folder: str | Path = ".") -> Scenario:
+        """Build a scenario from TOML text; `where` names it in messages.
+
+        Raises
+        ------
+        InputError
+            If the text is not a valid scenario.
+        """
+        return cls._build(parse_toml(text, where=where), where=where, folder=Path(folder))
+
+    # --- checks and completion -------------------------------------------------------------
+
+    @field_validator("species", mode="before")
+    @classmethod
+    def _complete_species(cls, species: Any) -> Any:
+        species = as_plain(species)
+        if not isinstance(species, dict):
+            return species
+        return {name: _complete(name, given) for name, given in species.items()}
+
+    @field_validator("planting")
+    @classmethod
+    def _read_stem_map(cls, planting: Planting, info: ValidationInfo) -> Planting:
+        if isinstance(planting, StemMap):
+            return _embed_stem_map(planting, info)
+        return planting
+
+    @model_validator(mode="after")
+    def _release_markers(self) -> Scenario:
+        markers = self.environment.markers
+        if self.mode == "paper" and markers and "release" not in markers.model_fields_set:
+            kept = markers.model_copy(update={"release": False})
+            environment = self.environment.model_copy(update={"markers": kept})
+            self.__dict__["environment"] = environment
+        return self
+
+    @model_validator(mode="after")
+    def _grid_fits(self) -> Scenario:
+        shadow, canopy = self.environment.shadow, self.environment.canopy
+        edge = canopy.voxel_m if canopy else shadow.voxel_m if shadow else None
+        if edge is None:
+            return self
+        fine = shadow.voxel_m if shadow else edge
+        name = "shadow" if shadow else "canopy"
+        size_x, size_y = self.plot.size_m
+        if size_x * size_y / fine**2 > _MOST_COLUMNS:
+            least = (size_x * size_y / _MOST_COLUMNS) ** 0.5
+            raise Refusal(
+                f"{fine:g} is too fine for a plot of {size_x:g} x {size_y:g} m",
+                key=f"environment.{name}.voxel_m",
+                expected=f"at least {least:.3g}",
+            )
+        if self.plot.boundary == "periodic":
+            fit = [max(round(size / edge), 1) * edge for size in self.plot.size_m]
+            if any(abs(a - b) > 1e-6 for a, b in zip(fit, self.plot.size_m, strict=True)):
+                raise Refusal(
+                    f"{list(self.plot.size_m)} is not a whole multiple of the voxel edge {edge:g}",
+                    key="plot.size_m",
+                    expected=f"on a periodic plot for example [{fit[0]:g}, {fit[1]:g}]",
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _trees_fit(self) -> Scenario:
+        planting = self.planting
+        if isinstance(planting, Explicit):
+            self._check_trees(planting)
+        elif not any(use.share > 0 for use in self.species.values()):
+            raise Refusal("every share is 0", key="species", expected="a share above 0")
+        elif isinstance(planting, Random):
+            placing.random_count(self.plot.size_m, planting.density_ha, planting.min_distance_m)
+        elif isinstance(planting, Regular):
+            size, step = self.plot.size_m, planting.spacing_m
+            if (size[0] / step[0]) * (size[1] / step[1]) > placing.MOST_TREES:
+                raise Refusal(
+                    "too many trees",
+                    key="planting.spacing_m",
+                    expected=f"at most {placing.MOST_TREES} trees on the plot",
+                )
+        return self
+
+    def _check_trees(self, planting: Explicit) -> None:
+        periodic = self.plot.boundary == "periodic"
+        spots = placing.Spots(self.plot.size_m, placing.SAME_SPOT_M, periodic=periodic)
+        for i, tree in enumerate(planting.trees):
+            key = f"planting.trees[{i}]"
+            _check_inside(tree.x_m, tree.y_m, self.plot, key=key)
+            if not tree.species and len(self.species) > 1:
+                raise Refusal("missing key 'species'", key=key, expected="a species' name")
+            if tree.species and tree.species not in self.species:
+                hint = nearest(tree.species, self.species)
+                raise Refusal(f"unknown species {tree.species!r}, {hint}", key=f"{key}.species")
+            other = spots.neighbour(tree.x_m, tree.y_m)
+            if other is not None:
+                raise Refusal(
+                    f"stands on the spot of trees[{other}]",
+                    key=key,
+                    expected="0.01 m or more apart",
+                )
+            spots.take(tree.x_m, tree.y_m, i)
+
+    @model_validator(mode="after")
+    def _samples_in_time(self) -> Scenario:
+        year = self.output.sample_trees.at_year
+        last = self.start_year + self.years
+        if year is not None and not self.start_year <= year <= last:
+            raise Refusal(
+                f"{year} is not a year of the run",
+                key="output.sample_trees.at_year",
+                expected=f"a calendar year, {self.start_year} to {last}",
+            )
+        return self
+
+    # --- use -------------------------------------------------------------------------------
+
+    @property
+    def species_list(self) -> tuple[Species, ...]:
+        """The species with all their parameters, in the order of the file."""
+        return tuple(self.species.values())
+
+    def planting_positions(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        """Place the trees of the first year.
+
+        Returns
+        -------
+        x, y : float64 arrays, m
+            Positions inside the plot, one per tree.
+        species : int64 array
+            Index into `species_list`.
+
+        Raises
+        ------
+        InputError
+            If a random planting finds no room for a tree.
+        """
+        planting, size = self.planting, self.plot.size_m
+        periodic = self.plot.boundary == "periodic"
+        if isinstance(planting, Explicit):
+            names = list(self.species)
+            x = np.array([tree.x_m for tree in planting.trees])
+            y = np.array([tree.y_m for tree in planting.trees])
+            if periodic:
+                x, y = x % size[0], y % size[1]
+            index = [names.index(tree.species) if tree.species else 0 for tree in planting.trees]
+            return x, y, np.array(index, dtype=np.int64)
+        if isinstance(planting, Regular):
+            x, y = placing.regular_spots(size, planting.spacing_m)
+        elif isinstance(planting, Random):
+            distance = planting.min_distance_m
+            count = placing.random_count(size, planting.density_ha, distance)
+            x, y = placing.random_spots(size, count, distance, self.seed, periodic=periodic)
+        else:  # a stem map has become explicit when the scenario was read
+            raise TypeError(planting)
+        shares = [use.share for use in self.species.values()]
+        return x, y, placing.draw_species(shares, len(x), self.seed)
+
+    def with_overrides(self, overrides: Iterable[str]) -> Scenario:
+        """Change keys and check the whole again, files included.
+
+        Parameters
+        ----------
+        overrides : iterable of str
+            ``"key.path=value"``; the value is read as TOML, or as text if it is none.
+
+        Raises
+        ------
+        InputError
+            If a key is unknown, a value is not allowed, or an override is not ``key=value``.
+        """
+        data = _as_given(self._given)
+        for override in overrides:
+            _set(data, override)
+        return self._build(data, where="--set", folder=self._folder)
+
+    def to_toml(self) -> str:
+        """Write the complete scenario, species and positions included, as TOML."""
+        return to_toml(self.model_dump())
+
+    def digest(self) -> str:
+        """Give the SHA-256 of the complete scenario, in hexadecimal."""
+        return hashlib.sha256(self.to_toml().encode()).hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        """Tell whether both say the same; how they were given does not matter."""
+        return isinstance(other, Scenario) and self.model_dump() == other.model_dump()
+
+    def __hash__(self) -> int:
+        return hash(self.digest())
+
+
+def _complete(name: str, given: Any) -> Any:
+    """Complete a species of the scenario from the shipped one that it names."""
+    if not isinstance(given, dict):
+        return given
+    base = given.get("base", name)
+    if base not in species_names():
+        hint = nearest(str(base), species_names())
+        key = f"{name}.base" if "base" in given else name
+        raise Refusal(f"unknown species {str(base)[:60]!r}, {hint}", key=key)
+    if given.get("name", name) != name:
+        raise Refusal(
+            f"{given['name']!r} is not the table's name", key=f"{name}.name", expected=repr(name)
+        )
+    table = {**shipped_table(base), "name": name, "base": base}
+    own_sources = given.get("sources", {})
+    for key, value in given.items():
+        if key not in SECTIONS or not isinstance(value, dict):
+            if key != "sources":
+                table[key] = value
+            continue
+        changed = [k for k in value if value[k] != as_plain(table[key].get(k))]
+        table["sources"][key] = {**table["sources"][key], **dict.fromkeys(changed, _OVERRIDE)}
+        table[key] = {**table[key], **value}
+    if not isinstance(own_sources, dict):
+        table["sources"] = own_sources
+        return table
+    for section, entries in own_sources.items():
+        old = table["sources"].get(section, {})
+        table["sources"][section] = {**old, **entries} if isinstance(entries, dict) else entries
+    return table
+
+
+def _embed_stem_map(planting: StemMap, info: ValidationInfo) -> Explicit:
+    """Turn a stem map into explicit trees; its lines are checked here, where they are known."""
+    plot, species = info.data.get("plot"), info.data.get("species")
+    if plot is None or species is None:
+        return Explicit(trees=(PlantedTree(x_m=0.0, y_m=0.0),))  # refused for plot or species
+    spots = placing.Spots(plot.size_m, placing.SAME_SPOT_M, periodic=plot.boundary == "periodic")
+    trees = []
+    try:
+        rows = files.read_stem_map(planting.file, planting.species, info.context)
+    except Refusal as error:
+        raise Refusal(error.what, key="file", expected=error.expected) from None
+    for line, x, y, name in rows:
+        label = f"{planting.file!r} line {line}"
+        _check_inside(x, y, plot, key="file", label=f"{label}: ")
+        name = name or (next(iter(species)) if len(species) == 1 else "")
+        if name not in species:
+            hint = nearest(name, species)
+            what = f"unknown species {name[:60]!r}" if name else "no species"
+            raise Refusal(f"{label}, column 'species': {what}, {hint}", key="file")
+        other = spots.neighbour(x, y)
+        if other is not None:
+            raise Refusal(
+                f"{label} stands on the spot of line {other}",
+                key="file",
+                expected="trees 0.01 m or more apart",
+            )
+        spots.take(x, y, line)
+        trees.append(PlantedTree(x_m=x, y_m=y, species=name))
+    return Explicit(trees=tuple(trees))
+
+
+def _check_inside(x: float, y: float, plot: Plot, *, key: str, label: str = "") -> None:
+    if not (0 <= x <= plot.size_m[0] and 0 <= y <= plot.size_m[1]):
+        raise Refusal(
+            f"{label}({x:g}, {y:g}) is outside the plot",
+            key=key,
+            expected=f"x_m 0 to {plot.size_m[0]:g}, y_m 0 to {plot.size_m[1]:g}",
+        )
+
+
+def _as_given(data: Any) -> Any:
+    """Copy the given tables, so that overrides change no other scenario."""
+    if isinstance(data, Mapping):
+        return {key: _as_given(value) for key, value in data.items()}
+    return copy.copy(data)
+
+
+def _set(data: dict[str, Any], override: str) -> None:
+    """Put one ``key.path=value`` into nested tables."""
+    path, sign, text = override.partition("=")
+    keys = [key.strip() for key in path.split(".")]
+    if not sign or not all(keys):
+        raise InputError(
+            f"{override!r} is not an override", where="--set", expected="key.path=value"
+        )
+    table = data
+    for depth, key in enumerate(keys[:-1]):
+        table = table.setdefault(key, {})
+        if not isinstance(table, dict):
+            raise InputError(
+                f"{'.'.join(keys[: depth + 1])!r} is not a table",
+                where=f"--set: {path}",
+                expected="the key of a table",
+            )
+    table[keys[-1]] = _override_value(text)
+
+
+def _override_value(text: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return parsed["value"] if len(parsed) == 1 else text
