@@ -1,0 +1,228 @@
+"""The list of living buds, and what each of them found in the marker space."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from forest._jit import njit, njit_parallel
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
+
+#: Sites are worked on in this many chunks, whatever the number of threads.
+CHUNKS = 64
+
+KIND_TERMINAL = np.uint8(0)
+KIND_LATERAL = np.uint8(1)
+
+_TERMINAL = 2
+_LATERAL = 4
+_NO_ROOM_TERMINAL = 32
+_NO_ROOM_LATERAL = 64
+_KEEP = 255 - _NO_ROOM_TERMINAL - _NO_ROOM_LATERAL
+
+
+class Buds(NamedTuple):
+    """All living buds, ordered by tree, metamer and kind (terminal before lateral).
+
+    `position` is absolute (m, not wrapped); `heading` is the unit vector that a bud points to:
+    that of its internode for a terminal bud, its own for a lateral one.
+    """
+
+    first_of_tree: NDArray[np.int64]
+    tree_row: NDArray[np.int32]
+    metamer: NDArray[np.int32]
+    kind: NDArray[np.uint8]
+    serial: NDArray[np.int32]
+    species: NDArray[np.int16]
+    position: NDArray[np.float64]
+    heading: NDArray[np.float32]
+
+
+class BudSpace(NamedTuple):
+    """What each living bud found: Palubicki et al. 2009, section 4.1.
+
+    Attributes
+    ----------
+    first_of_tree : int64 (n_trees + 1,)
+        Buds of tree row t are entries ``first_of_tree[t]`` to ``first_of_tree[t + 1]``.
+    tree_row, metamer : int32 (n,)
+        Row of the tree and index of the metamer in the tree's extent.
+    kind : uint8 (n,)
+        0 for the terminal, 1 for the lateral bud of the metamer.
+    found : int32 (n,)
+        Markers that belong to the bud; it has space to grow (Q = 1) if there are any.
+    direction : float32 (n, 3)
+        Unit vector V, the normalized sum of unit vectors to its markers; zero if it has none.
+    """
+
+    first_of_tree: NDArray[np.int64]
+    tree_row: NDArray[np.int32]
+    metamer: NDArray[np.int32]
+    kind: NDArray[np.uint8]
+    found: NDArray[np.int32]
+    direction: NDArray[np.float32]
+
+
+@njit
+def chunk_bounds(total: Any, chunk: Any) -> Any:
+    """Bounds of one of the fixed chunks of `total` items."""
+    return total * chunk // CHUNKS, total * (chunk + 1) // CHUNKS
+
+
+@njit
+def _tree_of(first_site: Any, site: Any) -> Any:
+    """Row of the tree that holds a site (trees without metamers hold none)."""
+    return np.searchsorted(first_site, site, side="right") - 1
+
+
+@njit_parallel
+def _count_buds(metamers: Any, trees: Any, first_site: Any) -> Any:
+    count = np.zeros(CHUNKS, np.int64)
+    for c in prange(CHUNKS):
+        site, end = chunk_bounds(first_site[-1], c)
+        buds = 0
+        while site < end:
+            t = _tree_of(first_site, site)
+            shift = trees.start[t] - first_site[t]
+            stop = min(end, first_site[t + 1])
+            for k in range(site + shift, stop + shift):
+                state = metamers.state[k]
+                buds += (state & _TERMINAL != 0) + (state & _LATERAL != 0)
+            site = stop
+        count[c] = buds
+    return count
+
+
+@njit
+def _write_bud(metamers: Any, trees: Any, buds: Any, b: Any, t: Any, k: Any, kind: Any) -> None:
+    """Fill entry `b` of the list with one bud of arena metamer `k`, tree row `t`."""
+    buds.tree_row[b] = t
+    buds.metamer[b] = k - trees.start[t]
+    buds.kind[b] = kind
+    buds.serial[b] = metamers.serial[k]
+    buds.species[b] = trees.species[t]
+    buds.position[b, 0] = trees.x[t] + np.float64(metamers.tip[k, 0])
+    buds.position[b, 1] = trees.y[t] + np.float64(metamers.tip[k, 1])
+    buds.position[b, 2] = np.float64(metamers.tip[k, 2])
+    if kind == KIND_LATERAL:
+        for axis in range(3):
+            buds.heading[b, axis] = metamers.bud[k, axis]
+        return
+    x = np.float64(metamers.tip[k, 0])
+    y = np.float64(metamers.tip[k, 1])
+    z = np.float64(metamers.tip[k, 2])
+    if metamers.parent[k] >= 0:
+        p = trees.start[t] + metamers.parent[k]
+        x -= np.float64(metamers.tip[p, 0])
+        y -= np.float64(metamers.tip[p, 1])
+        z -= np.float64(metamers.tip[p, 2])
+    length = np.sqrt(x * x + y * y + z * z)
+    buds.heading[b, 0] = x / length
+    buds.heading[b, 1] = y / length
+    buds.heading[b, 2] = z / length
+
+
+@njit_parallel
+def _fill_buds(metamers: Any, trees: Any, first_site: Any, first_bud: Any, buds: Any) -> None:
+    for c in prange(CHUNKS):
+        site, end = chunk_bounds(first_site[-1], c)
+        b = first_bud[c]
+        while site < end:
+            t = _tree_of(first_site, site)
+            shift = trees.start[t] - first_site[t]
+            stop = min(end, first_site[t + 1])
+            for k in range(site + shift, stop + shift):
+                state = metamers.state[k]
+                if state & _TERMINAL:
+                    _write_bud(metamers, trees, buds, b, t, k, KIND_TERMINAL)
+                    b += 1
+                if state & _LATERAL:
+                    _write_bud(metamers, trees, buds, b, t, k, KIND_LATERAL)
+                    b += 1
+            site = stop
+
+
+def _first_sites(trees: Trees) -> NDArray[np.int64]:
+    """Number the metamers of all trees in table order; give the first of each tree."""
+    return np.concatenate((np.zeros(1, np.int64), np.cumsum(trees.size, dtype=np.int64)))
+
+
+def list_buds(metamers: Metamers, trees: Trees) -> Buds:
+    """List the living buds of all trees."""
+    first_site = _first_sites(trees)
+    count = _count_buds(metamers, trees, first_site)
+    first_bud = np.concatenate((np.zeros(1, np.int64), np.cumsum(count)))
+    n = int(first_bud[-1])
+    buds = Buds(
+        first_of_tree=np.empty(0, np.int64),
+        tree_row=np.empty(n, np.int32),
+        metamer=np.empty(n, np.int32),
+        kind=np.empty(n, np.uint8),
+        serial=np.empty(n, np.int32),
+        species=np.empty(n, np.int16),
+        position=np.empty((n, 3)),
+        heading=np.empty((n, 3), np.float32),
+    )
+    _fill_buds(metamers, trees, first_site, first_bud, buds)
+    rows = np.arange(len(trees.size) + 1, dtype=np.int32)
+    return buds._replace(first_of_tree=np.searchsorted(buds.tree_row, rows).astype(np.int64))
+
+
+@njit
+def bud_index(space: Any, tree_row: Any, metamer: Any, kind: Any) -> Any:
+    """Find a bud in the list; -1 if the metamer bears no such living bud."""
+    low = space.first_of_tree[tree_row]
+    end = space.first_of_tree[tree_row + 1]
+    high = end
+    while low < high:
+        middle = (low + high) // 2
+        if space.metamer[middle] < metamer:
+            low = middle + 1
+        else:
+            high = middle
+    while low < end and space.metamer[low] == metamer:
+        if space.kind[low] == kind:
+            return low
+        low += 1
+    return np.int64(-1)
+
+
+@njit_parallel
+def _mark_room(metamers: Any, trees: Any, first_site: Any, space: Any) -> None:
+    for c in prange(CHUNKS):
+        site, end = chunk_bounds(first_site[-1], c)
+        while site < end:
+            t = _tree_of(first_site, site)
+            stop = min(end, first_site[t + 1])
+            own = space.metamer[space.first_of_tree[t] : space.first_of_tree[t + 1]]
+            b = space.first_of_tree[t] + np.searchsorted(own, site - first_site[t])
+            shift = trees.start[t] - first_site[t]
+            for k in range(site + shift, stop + shift):
+                state = metamers.state[k] & _KEEP
+                if state & _TERMINAL:
+                    if space.found[b] == 0:
+                        state |= _NO_ROOM_TERMINAL
+                    b += 1
+                if state & _LATERAL:
+                    if space.found[b] == 0:
+                        state |= _NO_ROOM_LATERAL
+                    b += 1
+                metamers.state[k] = state
+            site = stop
+
+
+def apply_space(metamers: Metamers, trees: Trees, space: BudSpace) -> None:
+    """Set the bits NO_ROOM_* of buds that found no marker (Q = 0) and clear all others.
+
+    Parameters
+    ----------
+    metamers, trees
+        The arena, changed in place, and the table that `space` was made from.
+    space : BudSpace
+        This year's claims.
+    """
+    _mark_room(metamers, trees, _first_sites(trees), space)

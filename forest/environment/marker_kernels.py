@@ -1,0 +1,373 @@
+"""Competition for markers: which bud each marker belongs to (Palubicki et al. 2009, 4.1)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from forest._jit import njit, njit_parallel
+from forest.environment.marker_buds import CHUNKS, chunk_bounds
+from forest.environment.marker_tiles import (
+    CELLS,
+    EDGE,
+    cell_words,
+    inside,
+    jitter,
+    row_bounds,
+)
+
+_BLOCK = 8  # neighbouring tiles that a chunk takes together
+
+
+class Scratch(NamedTuple):
+    """Markers of one tile that are still free: place, code, best squared distance, its entry."""
+
+    point: NDArray[np.float64]
+    code: NDArray[np.int64]
+    best: NDArray[np.float64]
+    winner: NDArray[np.int32]
+
+
+@njit
+def _gather(
+    lattice: Any, envelopes: Any, cloud: Any, bits: Any, x: Any, y: Any, z: Any, free: Any
+) -> Any:
+    """List the markers of a tile that exist and are not gone; give their number."""
+    n = 0
+    tile_x = lattice.low[0] + x
+    j0 = (lattice.low[1] + y) * EDGE
+    k0 = (lattice.low[2] + z) * EDGE
+    for c in range(EDGE):
+        for b in range(EDGE):
+            j = j0 + b
+            k = k0 + c
+            if k < 0 or (lattice.cells[1] > 0 and (j < 0 or j >= lattice.cells[1])):
+                continue
+            words = cell_words(lattice.seed, tile_x, j, k)
+            for a in range(EDGE):
+                i = tile_x * EDGE + a
+                code = (c * EDGE + b) * EDGE + a
+                if (bits >> np.uint64(code)) & np.uint64(1):
+                    continue
+                if lattice.cells[0] > 0 and (i < 0 or i >= lattice.cells[0]):
+                    continue
+                u, v, w = jitter(words[a])
+                free.point[0, n] = (i + u) * lattice.cell[0]
+                free.point[1, n] = (j + v) * lattice.cell[1]
+                free.point[2, n] = (k + w) * lattice.cell[2]
+                free.code[n] = code
+                if inside(envelopes, free.point[0, n], free.point[1, n], free.point[2, n]):
+                    n += 1
+    if len(cloud.first) > 0:
+        t = (z * lattice.shape[1] + y) * lattice.shape[0] + x
+        for p in range(cloud.first[t], cloud.first[t + 1]):
+            m = cloud.order[p]
+            if cloud.gone[m] == 0:
+                for axis in range(3):
+                    free.point[axis, n] = cloud.point[m, axis]
+                free.code[n] = CELLS + m
+                n += 1
+    return n
+
+
+@njit
+def _clear_occupied(
+    lattice: Any, entries: Any, rows: Any, sites: Any, x: Any, y: Any, z: Any, free: Any, n: Any
+) -> Any:
+    """Drop the markers in the occupancy zone of any bud; give the number left."""
+    mx, my, mz = free.point[0], free.point[1], free.point[2]
+    code = free.code
+    for r in range(len(rows.offset)):
+        start, end = row_bounds(lattice, entries.first, rows, r, x, y, z)
+        for e in range(start, end):
+            radius = sites.occupancy[entries.species[e]]
+            bx, by, bz = entries.point[e, 0], entries.point[e, 1], entries.point[e, 2]
+            left = 0
+            for m in range(n):
+                dx = mx[m] - bx
+                dy = my[m] - by
+                dz = mz[m] - bz
+                outside = dx * dx + dy * dy + dz * dz > radius * radius
+                mx[left] = mx[m]
+                my[left] = my[m]
+                mz[left] = mz[m]
+                code[left] = code[m]
+                left += outside
+            n = left
+            if n == 0:
+                return 0
+    return n
+
+
+@njit
+def _precedes(buds: Any, a: Any, b: Any) -> Any:
+    """Order buds that are equally near: the lower tree, then serial number, terminal first."""
+    if buds.tree_row[a] != buds.tree_row[b]:
+        return buds.tree_row[a] < buds.tree_row[b]
+    if buds.serial[a] != buds.serial[b]:
+        return buds.serial[a] < buds.serial[b]
+    return buds.kind[a] < buds.kind[b]
+
+
+@njit
+def _bounding_sphere(free: Any, n: Any) -> Any:
+    """Centre and radius of a sphere around the free markers of a tile."""
+    low_x = high_x = free.point[0, 0]
+    low_y = high_y = free.point[1, 0]
+    low_z = high_z = free.point[2, 0]
+    for m in range(1, n):
+        low_x = min(low_x, free.point[0, m])
+        high_x = max(high_x, free.point[0, m])
+        low_y = min(low_y, free.point[1, m])
+        high_y = max(high_y, free.point[1, m])
+        low_z = min(low_z, free.point[2, m])
+        high_z = max(high_z, free.point[2, m])
+    x, y, z = high_x - low_x, high_y - low_y, high_z - low_z
+    radius = 0.5 * np.sqrt(x * x + y * y + z * z)
+    return 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), 0.5 * (low_z + high_z), radius
+
+
+@njit
+def _offer(entries: Any, sites: Any, buds: Any, e: Any, sphere: Any, free: Any, n: Any) -> None:
+    """Let one bud compete for the free markers of a tile that its perception cone holds."""
+    s = entries.species[e]
+    reach = sites.perception[s]
+    bx, by, bz = entries.point[e, 0], entries.point[e, 1], entries.point[e, 2]
+    dx, dy, dz = sphere[0] - bx, sphere[1] - by, sphere[2] - bz
+    distance2 = dx * dx + dy * dy + dz * dz
+    far = (reach + sphere[3]) * 1.00001
+    if distance2 > far * far:
+        return
+    hx = np.float64(entries.heading[e, 0])
+    hy = np.float64(entries.heading[e, 1])
+    hz = np.float64(entries.heading[e, 2])
+    # The sphere lies wholly outside when it is further from the cone's mantle than its radius.
+    along = dx * hx + dy * hy + dz * hz
+    across = np.sqrt(max(distance2 - along * along, 0.0))
+    cosine = sites.cosine[s]
+    if across * cosine - along * sites.sine[s] > sphere[3] + 1e-5 * far:
+        return
+    for m in range(n):
+        dx = free.point[0, m] - bx
+        dy = free.point[1, m] - by
+        dz = free.point[2, m] - bz
+        distance2 = dx * dx + dy * dy + dz * dz
+        if distance2 > free.best[m] or distance2 > reach * reach:
+            continue
+        if not dx * hx + dy * hy + dz * hz >= cosine * np.sqrt(distance2):
+            continue
+        old = free.winner[m]
+        if (
+            old >= 0
+            and distance2 == free.best[m]
+            and not _precedes(buds, entries.bud[e], entries.bud[old])
+        ):
+            continue
+        free.best[m] = distance2
+        free.winner[m] = e
+
+
+@njit
+def _compete_in_tile(
+    lattice: Any,
+    entries: Any,
+    rows: Any,
+    sites: Any,
+    buds: Any,
+    x: Any,
+    y: Any,
+    z: Any,
+    free: Any,
+    n: Any,
+) -> None:
+    """Give each free marker of a tile to the nearest bud whose cone holds it."""
+    for m in range(n):
+        free.best[m] = np.inf
+        free.winner[m] = -1
+    sphere = _bounding_sphere(free, n)
+    for r in range(len(rows.offset)):
+        start, end = row_bounds(lattice, entries.first, rows, r, x, y, z)
+        for e in range(start, end):
+            _offer(entries, sites, buds, e, sphere, free, n)
+
+
+@njit_parallel
+def compete(
+    lattice: Any,
+    entries: Any,
+    rows_near: Any,
+    rows_far: Any,
+    sites: Any,
+    buds: Any,
+    envelopes: Any,
+    cloud: Any,
+    gone: Any,
+    release: Any,
+    tiles: Any,
+    scratch_size: Any,
+) -> Any:
+    """Take the markers near buds and give the free ones to buds.
+
+    Parameters
+    ----------
+    lattice, entries, rows_near, rows_far, sites, buds, envelopes, cloud
+        See their classes; the rows reach as far as occupancy (near) and perception (far).
+    gone : Gone
+        Markers that are gone for good; updated unless `release`.
+    tiles : int64 (n,)
+        Tiles to work on, as flat indices of the box.
+    scratch_size : int
+        Largest number of markers in a tile.
+
+    Returns
+    -------
+    winner, cloud_winner : int32 (n, 64), int32 (n_cloud,)
+        Entry that each marker belongs to; -1 for none.
+    """
+    nx, ny, _ = lattice.shape
+    winner = np.empty((len(tiles), CELLS), np.int32)
+    cloud_winner = np.full(len(cloud.point), -1, np.int32)
+    blocks = (len(tiles) + _BLOCK - 1) // _BLOCK
+    for c in prange(CHUNKS):
+        free = Scratch(
+            np.empty((3, scratch_size)),
+            np.empty(scratch_size, np.int64),
+            np.empty(scratch_size),
+            np.empty(scratch_size, np.int32),
+        )
+        for block in range(c, blocks, CHUNKS):
+            for t in range(block * _BLOCK, min((block + 1) * _BLOCK, len(tiles))):
+                winner[t, :] = -1
+                x = tiles[t] % nx
+                y = tiles[t] // nx % ny
+                z = tiles[t] // (nx * ny)
+                bits = np.uint64(0)
+                if not release:
+                    bits = gone.bits[z + gone.at[0], y + gone.at[1], x + gone.at[2]]
+                n = _gather(lattice, envelopes, cloud, bits, x, y, z, free)
+                here = np.uint64(0)
+                if not release:
+                    for m in range(n):
+                        if free.code[m] < CELLS:
+                            here |= np.uint64(1) << np.uint64(free.code[m])
+                        else:
+                            cloud.gone[free.code[m] - CELLS] = 1
+                n = _clear_occupied(lattice, entries, rows_near, sites, x, y, z, free, n)
+                if not release:
+                    for m in range(n):
+                        if free.code[m] < CELLS:
+                            here &= ~(np.uint64(1) << np.uint64(free.code[m]))
+                        else:
+                            cloud.gone[free.code[m] - CELLS] = 0
+                    gone.bits[z + gone.at[0], y + gone.at[1], x + gone.at[2]] = bits | here
+                if n == 0:
+                    continue
+                _compete_in_tile(lattice, entries, rows_far, sites, buds, x, y, z, free, n)
+                for m in range(n):
+                    if free.code[m] < CELLS:
+                        winner[t, free.code[m]] = free.winner[m]
+                    else:
+                        cloud_winner[free.code[m] - CELLS] = free.winner[m]
+    return winner, cloud_winner
+
+
+@njit
+def sort_won(winner: Any, cloud_winner: Any, entry_bud: Any, n_buds: Any) -> Any:
+    """Sort won markers by bud; stable, so that sums over them run in a fixed order.
+
+    Returns
+    -------
+    first : int64 (n_buds + 1,)
+        Bud b won the markers ``won[first[b] : first[b + 1]]``.
+    won : int64 (n,)
+        Flat indices into `winner`, and behind them those into `cloud_winner`.
+    """
+    flat = winner.reshape(-1)
+    first = np.zeros(n_buds + 1, np.int64)
+    for entry in flat:
+        if entry >= 0:
+            first[entry_bud[entry] + 1] += 1
+    for entry in cloud_winner:
+        if entry >= 0:
+            first[entry_bud[entry] + 1] += 1
+    first = np.cumsum(first)
+    cursor = first[:-1].copy()
+    won = np.empty(first[n_buds], np.int64)
+    for k in range(len(flat)):
+        if flat[k] >= 0:
+            b = entry_bud[flat[k]]
+            won[cursor[b]] = k
+            cursor[b] += 1
+    for k in range(len(cloud_winner)):
+        if cloud_winner[k] >= 0:
+            b = entry_bud[cloud_winner[k]]
+            won[cursor[b]] = len(flat) + k
+            cursor[b] += 1
+    return first, won
+
+
+@njit
+def _marker(lattice: Any, tile: Any, code: Any) -> Any:
+    """Place of a procedural marker."""
+    nx, ny, _ = lattice.shape
+    tile_x = lattice.low[0] + tile % nx
+    j = (lattice.low[1] + tile // nx % ny) * EDGE + code // EDGE % EDGE
+    k = (lattice.low[2] + tile // (nx * ny)) * EDGE + code // (EDGE * EDGE)
+    a = code % EDGE
+    words = cell_words(lattice.seed, tile_x, j, k)
+    u, v, w = jitter(words[a])
+    x = (tile_x * EDGE + a + u) * lattice.cell[0]
+    return x, (j + v) * lattice.cell[1], (k + w) * lattice.cell[2]
+
+
+@njit_parallel
+def directions(
+    lattice: Any,
+    entries: Any,
+    cloud: Any,
+    tiles: Any,
+    winner: Any,
+    cloud_winner: Any,
+    first: Any,
+    won: Any,
+) -> Any:
+    """Sum the unit vectors from each bud to its markers, normalized (V of 4.1).
+
+    Returns
+    -------
+    float32 (n_buds, 3)
+        Zero for a bud without markers.
+    """
+    n_buds = len(first) - 1
+    direction = np.zeros((n_buds, 3), np.float32)
+    flat = winner.reshape(-1)
+    for c in prange(CHUNKS):
+        start, end = chunk_bounds(n_buds, c)
+        for b in range(start, end):
+            sx = sy = sz = 0.0
+            for p in range(first[b], first[b + 1]):
+                k = won[p]
+                if k < len(flat):
+                    e = flat[k]
+                    x, y, z = _marker(lattice, tiles[k // CELLS], k % CELLS)
+                else:
+                    m = k - len(flat)
+                    e = cloud_winner[m]
+                    x, y, z = cloud.point[m, 0], cloud.point[m, 1], cloud.point[m, 2]
+                x -= entries.point[e, 0]
+                y -= entries.point[e, 1]
+                z -= entries.point[e, 2]
+                distance = np.sqrt(x * x + y * y + z * z)
+                if distance > 0.0:
+                    sx += x / distance
+                    sy += y / distance
+                    sz += z / distance
+            length = np.sqrt(sx * sx + sy * sy + sz * sz)
+            if length > 0.0:
+                direction[b, 0] = sx / length
+                direction[b, 1] = sy / length
+                direction[b, 2] = sz / length
+    return direction
