@@ -1,8 +1,9 @@
-"""The one error that a user's input can cause."""
+"""The errors that a user's input can cause."""
 
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable
 
 
@@ -26,6 +27,18 @@ class InputError(ValueError):
         if expected:
             parts.append(f"; expected {expected}")
         super().__init__(" ".join("".join(parts).split()))
+
+
+class OutputError(InputError):
+    """Output that cannot be written: the folder, the rights, or the room on the disk."""
+
+    @classmethod
+    def of(cls, error: OSError, path: object) -> OutputError:
+        """Say in one line what the operating system refused."""
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            return cls("no room left on the disk", where=str(path))
+        reason = error.strerror or "failed"
+        return cls(f"cannot be written: {reason[:1].lower()}{reason[1:]}", where=str(path))
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -1,0 +1,304 @@
+"""The run file's tables: every column with its dtype, unit, meaning and missing value.
+
+The writer makes its datasets from these definitions, the reader its dtypes, the documentation its
+tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+FILE_TYPE = "forest run"
+SCHEMA_VERSION = 1
+
+STATUS = ("living", "dead")
+EVENT_KINDS = ("planted", "recruited", "died", "felled", "pruned", "windthrown")
+CAUSES = (
+    "none",
+    "suppression",
+    "age",
+    "background",
+    "buckling",
+    "wind",
+    "thinning",
+    "harvest",
+    "no_buds",
+)
+
+#: Levels of a column of species: the run's own list, without or with the entry for all of them.
+SPECIES = ("<species>",)
+SPECIES_OR_ALL = ("<species>", "all")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    name : str
+        Name of the dataset.
+    dtype : str
+        NumPy dtype as stored.
+    unit : str
+        Unit; empty for counts, codes and shares.
+    description : str
+        Meaning.
+    missing : str
+        How a missing value is stored; empty if none can be missing.
+    levels : tuple of str
+        For codes: the names that 0, 1, 2... stand for.
+    """
+
+    name: str
+    dtype: str
+    unit: str
+    description: str
+    missing: str = ""
+    levels: tuple[str, ...] = ()
+
+    def with_species(self, species_names: Sequence[str]) -> Column:
+        """Give the column with the run's own species in place of the placeholder."""
+        if self.levels[:1] != SPECIES:
+            return self
+        return replace(self, levels=(*species_names, *self.levels[1:]))
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table: what a row is, and its columns."""
+
+    row: str
+    columns: tuple[Column, ...]
+
+    def with_species(self, species_names: Sequence[str]) -> Table:
+        """Give the table with the run's own species as levels."""
+        columns = tuple(column.with_species(species_names) for column in self.columns)
+        return replace(self, columns=columns)
+
+
+def _number(name: str, unit: str, description: str, dtype: str = "float32") -> Column:
+    return Column(name, dtype, unit, description, missing="NaN")
+
+
+def _count(name: str, description: str, dtype: str = "int32") -> Column:
+    return Column(name, dtype, "", description)
+
+
+_YEAR = Column("year", "int32", "calendar year", "the year at whose end the row was taken")
+_TREE = Column("tree_id", "int32", "", "number of the tree, from 1, never used twice")
+_SPECIES = Column("species", "int16", "", "species of the tree", levels=SPECIES)
+_SPECIES_OR_ALL = Column("species", "int16", "", "species, or all together", levels=SPECIES_OR_ALL)
+
+
+TREES = Table(
+    "a tree and year",
+    (
+        _YEAR,
+        _TREE,
+        _SPECIES,
+        Column("x_m", "float32", "m", "place of the stem base"),
+        Column("y_m", "float32", "m", "place of the stem base"),
+        Column("age", "int32", "years", "years since it was planted or recruited"),
+        Column("status", "int8", "", "whether it lives at the end of the year", levels=STATUS),
+        _number("dbh_cm", "cm", "stem diameter over bark at 1.3 m"),
+        _number("base_diameter_cm", "cm", "stem diameter over bark at the base"),
+        _number("height_m", "m", "height of the highest tip"),
+        _number("crown_base_m", "m", "height of the lowest living site"),
+        _number("crown_radius_m", "m", "mean reach of the crown in eight directions"),
+        _number("crown_area_m2", "m2", "area of the octagon of the eight reaches"),
+        _number("lean_deg", "degrees", "angle between the vertical and the line from base to top"),
+        _number("basal_area_m2", "m2", "cross section over bark at 1.3 m; 0 below that height"),
+        _number("stem_volume_m3", "m3", "volume of the stem from base to top, over bark"),
+        _number(
+            "merchantable_volume_m3", "m3", "its part above the stump that is thick enough to sell"
+        ),
+        _number("biomass_kg", "kg dry mass", "wood of stem and branches, and leaves"),
+        _number("leaf_area_m2", "m2", "one-sided area of its leaves"),
+        _number("light", "0..1", "mean relative light of its living sites"),
+        _number("ring_width_mm", "mm", "width of this year's ring at 1.3 m"),
+        _count("metamers", "number of metamers"),
+        _count("buds", "number of living sites"),
+    ),
+)
+
+
+def _stand(name: str, unit: str, description: str) -> Column:
+    return _number(name, unit, description, dtype="float64")
+
+
+STAND = Table(
+    "a year and species, and one for all species",
+    (
+        _YEAR,
+        _SPECIES_OR_ALL,
+        _stand("n_ha", "1/ha", "living trees"),
+        _stand("basal_area_m2ha", "m2/ha", "basal area G over bark"),
+        _stand("qmd_cm", "cm", "quadratic mean diameter of the trees that have a dbh"),
+        _stand("mean_dbh_cm", "cm", "arithmetic mean diameter of the trees that have a dbh"),
+        _stand("top_height_m", "m", "mean height of the 100 thickest trees per ha"),
+        _stand("lorey_height_m", "m", "mean height weighted by basal area"),
+        _stand("volume_m3ha", "m3/ha", "stem volume over bark"),
+        _stand("biomass_tha", "t/ha dry mass", "wood and leaves"),
+        _stand("lai", "m2/m2", "leaf area index, one-sided"),
+        _stand("floor_light", "0..1", "mean relative light on the ground; for all species only"),
+        _stand("canopy_cover", "0..1", "share of the plot under crowns"),
+        _stand("sdi", "1/ha", "Reineke's stand density index at 25.4 cm"),
+        _stand("recruits_ha", "1/ha", "trees recruited in the year"),
+        _stand("deaths_ha", "1/ha", "trees that died in the year"),
+        _stand("removed_ha", "1/ha", "trees felled in the year"),
+        _stand("removed_volume_m3ha", "m3/ha", "their stem volume"),
+        _stand("gini_basal_area", "0..1", "Gini coefficient of the trees' basal areas"),
+        _stand("shannon", "", "Shannon index of the species' shares of basal area"),
+        _stand("simpson", "0..1", "Simpson index of the species' shares of basal area"),
+        _stand("clark_evans", "", "Clark-Evans index: 1 random, above regular, below clustered"),
+        _stand("mingling", "0..1", "share of the four nearest neighbours of another species"),
+    ),
+)
+
+EVENTS = Table(
+    "something that happened to a tree",
+    (
+        _YEAR,
+        _TREE,
+        _SPECIES,
+        Column("kind", "int8", "", "what happened", levels=EVENT_KINDS),
+        Column("cause", "int8", "", "why", levels=CAUSES),
+        _count("mother_id", "tree that seeded it; 0 if planted or not known"),
+        _number("dbh_cm", "cm", "stem diameter over bark at 1.3 m"),
+        _number("height_m", "m", "height"),
+        _number("volume_m3", "m3", "stem volume"),
+    ),
+)
+
+RINGS = Table(
+    "a tree, stem height and year",
+    (
+        _YEAR,
+        _TREE,
+        _SPECIES,
+        Column("stem_height_m", "float32", "m", "height of the disc above the ground"),
+        Column("cambial_age", "int32", "years", "rings from the pith, this one included"),
+        _number("width_mm", "mm", "mean width of the ring; the widths add up to the wood radius"),
+        _number("eccentricity", "0..1", "how far off-centre the ring is; 0 for a circle"),
+        _number("thick_side_deg", "degrees", "azimuth of its thick side, from x towards y"),
+    ),
+)
+
+
+def _carbon(name: str, description: str) -> Column:
+    return Column(name, "float64", "kg dry mass/ha/year", description)
+
+
+CARBON = Table(
+    "a year and species, and one for all species",
+    (
+        _YEAR,
+        _SPECIES_OR_ALL,
+        _carbon("income", "photosynthesis less growth respiration"),
+        _carbon("leaves", "spent on leaves"),
+        _carbon("upkeep", "spent on the upkeep of sapwood"),
+        _carbon("extension", "spent on new metamers"),
+        _carbon("ring", "spent on rings"),
+        _carbon("reserve_change", "put aside (taken out, if negative)"),
+    ),
+)
+
+POPULATION = Table(
+    "a year: the ledger of the living",
+    (
+        _YEAR,
+        _count("living_before", "living trees at the end of the year before"),
+        _count("planted", "trees planted"),
+        _count("recruited", "trees recruited"),
+        _count("died", "trees that died standing"),
+        _count("felled", "trees felled"),
+        _count("windthrown", "trees thrown by wind"),
+        _count("living", "living trees at the end of the year"),
+    ),
+)
+
+#: The tables that a scenario may choose.
+TABLES: dict[str, Table] = {
+    "trees": TREES,
+    "stand": STAND,
+    "events": EVENTS,
+    "rings": RINGS,
+    "carbon": CARBON,
+}
+
+#: The tables that a run file may hold.
+ALL_TABLES: dict[str, Table] = {**TABLES, "population": POPULATION}
+
+_SERIAL = Column("serial", "int32", "", "number of the metamer, counted per tree, never changed")
+
+#: The tables of a sample tree, each a group of `/samples/<tree_id>`.
+SAMPLE_TABLES: dict[str, Table] = {
+    "metamers": Table(
+        "a metamer, parents before children",
+        (
+            _SERIAL,
+            Column("parent_serial", "int32", "", "serial of its parent; -1 at the base", "-1"),
+            Column("end_x_m", "float32", "m", "its upper end, from the plot's corner"),
+            Column("end_y_m", "float32", "m", "its upper end, from the plot's corner"),
+            Column("end_z_m", "float32", "m", "its upper end, above the ground"),
+            Column("order", "uint8", "", "branching order; 0 on the trunk"),
+            Column("main", "uint8", "", "1 if it continues its parent's axis, 0 if it starts one"),
+            Column("birth_year", "int32", "calendar year", "year in which it was made"),
+        ),
+    ),
+    "dead": Table(
+        "a metamer that was shed, pruned or lost",
+        (_SERIAL, Column("year", "int32", "calendar year", "year in which that happened")),
+    ),
+    "radii": Table(
+        "a metamer and year; one year's rows follow each other, parents before children",
+        (
+            _SERIAL,
+            Column("radius_m", "float32", "m", "radius under bark at the end of the year"),
+            Column("leafy", "uint8", "", "1 if a living leaf-bearing site stands at its end"),
+        ),
+    ),
+    "steps": Table(
+        "a year of the tree's life on record",
+        (
+            Column("year", "int32", "calendar year", "the year"),
+            Column("metamers", "int64", "", "rows of `metamers` up to its end"),
+            Column("dead", "int64", "", "rows of `dead` up to its end"),
+            Column("radii", "int64", "", "rows of `radii` up to its end"),
+        ),
+    ),
+}
+
+
+def steps_table(tables: Sequence[str]) -> Table:
+    """Define `/steps`: the whole years on file, and the rows of each table up to their end."""
+    counts = (Column(name, "int64", "", f"rows of `/{name}` up to its end") for name in tables)
+    return Table("a whole year", (Column("year", "int32", "calendar year", "the year"), *counts))
+
+
+def columns_markdown() -> str:
+    """Write the tables of all columns for the documentation."""
+    parts = []
+    for path, table in (
+        *((f"/{name}", table) for name, table in ALL_TABLES.items()),
+        *((f"/samples/<tree_id>/{name}", table) for name, table in SAMPLE_TABLES.items()),
+    ):
+        lines = [
+            f"### `{path}`",
+            "",
+            f"One row for {table.row}.",
+            "",
+            "| column | type | unit | missing | meaning |",
+            "|--|--|--|--|--|",
+        ]
+        for column in table.columns:
+            levels = f": {', '.join(column.levels)}" if column.levels else ""
+            levels = levels.replace("<species>", "the run's species")
+            lines.append(
+                f"| `{column.name}` | {column.dtype} | {column.unit} | {column.missing} "
+                f"| {column.description}{levels} |"
+            )
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts) + "\n"
