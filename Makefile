@@ -13,6 +13,7 @@ help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(READY)  ## make .venv and install the project with all its tools
+	@echo "setup: $(VENV) is ready"
 
 $(READY): pyproject.toml
 	@if ! [ -x $(BIN)/python ]; then \
