@@ -1,0 +1,55 @@
+"""A stand of bud-level trees that grow, shade, crowd, thicken, die and seed in one shared space.
+
+Names are loaded when they are first used, so that `import forest` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from forest.errors import InputError
+    from forest.record.run import Run, open_run
+    from forest.scenario import Scenario
+    from forest.simulate import simulate
+    from forest.species import Species, load_species
+    from forest.stand import Stand
+    from forest.trees.skeleton import Skeleton
+
+__version__ = version("forest-stand")
+
+_HOMES = {
+    "InputError": "forest.errors",
+    "Run": "forest.record.run",
+    "Scenario": "forest.scenario",
+    "Skeleton": "forest.trees.skeleton",
+    "Species": "forest.species",
+    "Stand": "forest.stand",
+    "load_species": "forest.species",
+    "open_run": "forest.record.run",
+    "simulate": "forest.simulate",
+}
+
+__all__ = [
+    "InputError",
+    "Run",
+    "Scenario",
+    "Skeleton",
+    "Species",
+    "Stand",
+    "load_species",
+    "open_run",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'forest' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -1,0 +1,451 @@
+"""The stand and its year. `Stand.step` reads like the year; everything else serves it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest.dynamics.planting import seedlings
+from forest.dynamics.weather import income_factor
+from forest.environment.surroundings import Surroundings
+from forest.errors import InputError
+from forest.growth import budget
+from forest.growth.allocate import allocate
+from forest.growth.dealing import Deal, Workbench, deal
+from forest.growth.parameters import Year, species_traits
+from forest.growth.pipes import thicken
+from forest.growth.shedding import shed
+from forest.growth.shoots import extend, headings, shooting_buds, sprout
+from forest.measure.rings import remember_breast
+from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
+from forest.trees import table
+from forest.trees.metamers import Arena
+from forest.trees.pruning import cut_branch
+from forest.yearbook import Event, YearRecord, record_year
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from forest.scenario import Scenario
+    from forest.trees.skeleton import Skeleton
+
+
+class Stand:
+    """Trees that grow together in one space, driven year by year.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to grow, and where.
+
+    Attributes
+    ----------
+    year : int
+        The last calendar year that is complete; `start_year - 1` before the first step.
+    rows : Trees
+        The tree table, one row per living tree, in order of tree id.
+    arena : Arena
+        The metamers of all trees.
+    seconds : dict of str to float
+        Wall time spent in each phase of the year so far.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._start(scenario)
+        x, y, species = scenario.planting_positions()
+        self._plant(x, y, species)
+
+    def _start(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.species = scenario.species_list
+        self.species_names = [s.name for s in self.species]
+        self._paper = scenario.mode == "paper"
+        self._traits = species_traits(self.species, paper=self._paper)
+        self._measures_of = _measure_species(self)
+        self._surroundings = Surroundings(scenario)
+        self.arena = Arena()
+        self.rows = table.empty()
+        self._bench = Workbench()
+        self._step = 0
+        self._next_id = 1
+        self._pending: list[Event] = []
+        self.sample_ids: list[int] = []
+        self.seconds: dict[str, float] = {}
+
+    # ------------------------------------------------------------------ the year
+
+    def step(self) -> YearRecord:
+        """Grow for one year and give its record."""
+        self._step += 1
+        self._clock = time.perf_counter()
+        year = self._year()
+        accounts = np.zeros((len(self.rows.tree_id), budget.ACCOUNTS))
+        shared = deal(self.rows.size)
+        before = self._sample_serials()
+        self._lap("deal")
+
+        self._expose()
+        self._allocate(shared, year, accounts)
+        self._shed(shared)
+        shared = self._extend(year)
+        self._thicken(shared, year, accounts)
+        measures, dead = self._die()
+        record = record_year(self, measures, dead, accounts, before)
+        self._bury(dead, measures)
+        self._lap("record")
+        return record
+
+    def _expose(self) -> None:
+        self._surroundings.expose(self.arena.metamers, self.rows)
+        self._lap("expose")
+
+    def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
+        allocate(
+            self.arena.metamers,
+            self.rows,
+            shared,
+            self._bench.scratch(shared),
+            self._traits,
+            year,
+            accounts,
+        )
+        self._lap("allocate")
+
+    def _shed(self, shared: Deal) -> None:
+        shed(
+            self.arena.metamers,
+            self.rows,
+            shared,
+            self._bench.scratch(shared),
+            self._traits,
+            not self._paper,
+        )
+        self._lap("shed")
+
+    def _extend(self, year: Year) -> Deal:
+        rows = self.rows
+        shared = deal(rows.size)
+        shoots = shooting_buds(self.arena.metamers, rows, shared, self._traits)
+        self.arena.make_room(rows.start, rows.size, rows.room, rows.size + shoots.new)
+        arena = self.arena.metamers
+        heading = np.empty((len(shoots.metamer), 3), np.float32)
+        headings(arena, rows, shared, shoots, heading)
+        toward = self._surroundings.directions(arena, rows, shoots, heading)
+        extend(
+            arena,
+            rows,
+            shared,
+            shoots,
+            toward,
+            self._traits,
+            year,
+            self._surroundings.solid,
+            self._surroundings.voxel_m,
+        )
+        self._lap("extend")
+        return deal(rows.size)
+
+    def _thicken(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
+        thicken(
+            self.arena.metamers,
+            self.rows,
+            shared,
+            self._bench.scratch(shared),
+            self._traits,
+            year,
+            accounts,
+        )
+        self._lap("thicken")
+
+    def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
+        """Measure all trees; name the rows of those that die, with the cause."""
+        measures = measure_trees(
+            self.arena.metamers, self.rows, self._measures_of, self._full_light
+        )
+        dead: list[tuple[int, str]] = []
+        if not self._paper:
+            limit = self._traits.suppression_years[self.rows.species]
+            suppressed = self.rows.bad_years >= limit
+            for row in np.flatnonzero(suppressed | (measures.buds == 0)):
+                dead.append((int(row), "suppression" if suppressed[row] else "no_buds"))
+        self._lap("measure")
+        return measures, dead
+
+    def _bury(self, dead: list[tuple[int, str]], measures: TreeMeasures) -> None:
+        remember_breast(self.rows, measures)
+        self._pending = []
+        if dead:
+            alive = np.ones(len(self.rows.tree_id), np.bool_)
+            alive[[row for row, _ in dead]] = False
+            self.rows = table.keep(self.rows, alive)
+
+    def _year(self) -> Year:
+        s = self.scenario
+        factor = income_factor(
+            self.year,
+            s.seed,
+            s.weather.noise_sd,
+            [(e.year, e.factor) for e in s.weather.extreme_years],
+        )
+        return Year(
+            step=self._step,
+            seed=s.seed,
+            income_factor=factor * s.site.productivity,
+            full_light=self._full_light,
+            paper=self._paper,
+            priority=s.growth.bud_fate == "priority",
+            balance=s.growth.balance,
+        )
+
+    def _lap(self, phase: str) -> None:
+        now = time.perf_counter()
+        self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._clock
+        self._clock = now
+
+    # ------------------------------------------------------------------ acts between years
+
+    def plant(
+        self, x: Sequence[float], y: Sequence[float], species: str | Sequence[str]
+    ) -> list[int]:
+        """Plant seedlings; they start to grow with the next step.
+
+        Parameters
+        ----------
+        x, y : sequences of float
+            Places, m, inside the plot.
+        species : str or sequence of str
+            Name or names of species of the scenario.
+
+        Returns
+        -------
+        list of int
+            The new trees' ids.
+        """
+        names = [species] * len(x) if isinstance(species, str) else list(species)
+        known = {name: k for k, name in enumerate(self.species_names)}
+        for name in names:
+            if name not in known:
+                raise InputError(
+                    f"species '{name}' is not in this stand",
+                    where="Stand.plant",
+                    expected="one of " + ", ".join(known),
+                )
+        at = np.asarray(x, np.float64), np.asarray(y, np.float64)
+        width, depth = self.scenario.plot.size_m
+        inside = (at[0] >= 0) & (at[0] <= width) & (at[1] >= 0) & (at[1] <= depth)
+        if not inside.all():
+            k = int(np.flatnonzero(~inside)[0])
+            raise InputError(
+                f"({at[0][k]}, {at[1][k]}) is outside the plot",
+                where="Stand.plant",
+                expected=f"0 to {width} and 0 to {depth} m",
+            )
+        first = self._next_id
+        self._plant(*at, np.array([known[name] for name in names], np.int16))
+        return list(range(first, self._next_id))
+
+    def _plant(
+        self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]
+    ) -> None:
+        more = seedlings(
+            x,
+            y,
+            species,
+            first_id=self._next_id,
+            step=self._step,
+            seed=self.scenario.seed,
+            voxel_m=self._surroundings.voxel_m,
+            vigour_sd=np.array([s.carbon.vigour_sd for s in self.species]),
+            seed_reserve_kg=np.array([s.carbon.seed_reserve_kg for s in self.species]),
+        )
+        first_row = len(self.rows.tree_id)
+        self._next_id += len(more.tree_id)
+        self.rows = table.append(self.rows, more)
+        rows = self.rows
+        wanted = rows.size.astype(np.int64)
+        wanted[first_row:] = 1
+        self.arena.make_room(rows.start, rows.size, rows.room, wanted)
+        sprout(self.arena.metamers, rows, first_row, self._traits, self._year())
+        measures = self.measure()
+        for row in range(first_row, len(rows.tree_id)):
+            self._pending.append(Event.of(self, row, "planted", "none", measures))
+
+    def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> None:
+        """Fell trees: they are gone at once, with an event in the next year's record."""
+        rows = [self.row_of(tree_id) for tree_id in tree_ids]
+        measures = self.measure()
+        alive = np.ones(len(self.rows.tree_id), np.bool_)
+        for row in rows:
+            if alive[row]:
+                self._pending.append(Event.of(self, row, "felled", cause, measures))
+            alive[row] = False
+        self.rows = table.keep(self.rows, alive)
+
+    def prune(self, tree_id: int, metamer: int) -> int:
+        """Cut a tree above the foot of a metamer, named by its serial number.
+
+        Returns the number of metamers that go. Cutting the first metamer is refused: fell the tree.
+        """
+        row = self.row_of(tree_id)
+        measures = self.measure()
+        gone = cut_branch(self.arena.metamers, self.rows, row, metamer)
+        self._pending.append(Event.of(self, row, "pruned", "none", measures))
+        return gone
+
+    # ------------------------------------------------------------------ what it is now
+
+    @property
+    def year(self) -> int:
+        """The last complete calendar year."""
+        return self.scenario.start_year + self._step - 1
+
+    @property
+    def steps(self) -> int:
+        """Years grown so far."""
+        return self._step
+
+    @property
+    def pending(self) -> list[Event]:
+        """Events since the last record."""
+        return self._pending
+
+    @property
+    def floor_light(self) -> float:
+        """Mean relative irradiance on the ground, 0..1."""
+        return self._surroundings.floor_light()
+
+    @property
+    def pipe_exponent(self) -> NDArray[np.float64]:
+        """Pipe exponent n of each species, as used in this run: d = pipe^(1/n)."""
+        return self._traits.pipe_exponent
+
+    @property
+    def _full_light(self) -> float:
+        return self._surroundings.full_light
+
+    @property
+    def trees(self) -> pd.DataFrame:
+        """The living trees now: a row each, with the columns of `/trees` that need no ring."""
+        import pandas as pd
+
+        measures = self.measure()
+        columns: dict[str, Any] = {
+            "tree_id": self.rows.tree_id,
+            "species": [self.species_names[k] for k in self.rows.species],
+            "x_m": self.rows.x,
+            "y_m": self.rows.y,
+            "age": self._step - self.rows.birth,
+        }
+        hidden = ("breast_serial", "breast_birth", "breast_radius_m")
+        columns.update({k: v for k, v in measures._asdict().items() if k not in hidden})
+        return pd.DataFrame(columns)
+
+    def measure(self) -> TreeMeasures:
+        """Measure all living trees."""
+        return measure_trees(
+            self.arena.metamers, self.rows, self._measures_of, self._full_light
+        )
+
+    def skeleton(self, tree_id: int) -> Skeleton:
+        """The shape of a living tree."""
+        from forest.trees.skeleton import skeleton_of
+
+        row = self.row_of(tree_id)
+        kind = int(self.rows.species[row])
+        return skeleton_of(
+            self.arena.metamers,
+            self.rows,
+            row,
+            species=self.species_names[kind],
+            pipe_exponent=float(self.pipe_exponent[kind]),
+            start_year=self.scenario.start_year,
+        )
+
+    def row_of(self, tree_id: int) -> int:
+        """Find the row of a living tree."""
+        row = int(np.searchsorted(self.rows.tree_id, tree_id))
+        if row == len(self.rows.tree_id) or self.rows.tree_id[row] != tree_id:
+            raise InputError(
+                f"no living tree has the id {tree_id}",
+                where="Stand",
+                expected=f"one of the {len(self.rows.tree_id)} ids in stand.trees.tree_id",
+            )
+        return row
+
+    def _sample_serials(self) -> dict[int, NDArray[np.int32]]:
+        """Serials of the sample trees' metamers before the year, to tell what was shed."""
+        serials = {}
+        for tree_id in self.sample_ids:
+            row = int(np.searchsorted(self.rows.tree_id, tree_id))
+            if row < len(self.rows.tree_id) and self.rows.tree_id[row] == tree_id:
+                start, size = int(self.rows.start[row]), int(self.rows.size[row])
+                serials[tree_id] = self.arena.metamers.serial[start : start + size].copy()
+        return serials
+
+    # ------------------------------------------------------------------ checkpoints
+
+    def state(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Everything that the next year needs: arrays, and a few numbers (JSON)."""
+        arrays = {f"tree_{name}": column for name, column in self.rows._asdict().items()}
+        spans = [
+            (int(s), int(s) + int(n)) for s, n in zip(self.rows.start, self.rows.size, strict=True)
+        ]
+        for name, field in self.arena.metamers._asdict().items():
+            parts = [field[a:b] for a, b in spans]
+            arrays[f"metamer_{name}"] = np.concatenate(parts) if parts else field[:0]
+        arrays.update(self._surroundings.state())
+        meta = {
+            "step": self._step,
+            "next_id": self._next_id,
+            "sample_ids": list(self.sample_ids),
+        }
+        return arrays, meta
+
+    @classmethod
+    def restore(
+        cls, scenario: Scenario, arrays: dict[str, NDArray[Any]], meta: dict[str, Any]
+    ) -> Stand:
+        """Build the stand that `state` was taken of."""
+        stand = cls.__new__(cls)
+        stand._start(scenario)
+        stand._step = int(meta["step"])
+        stand._next_id = int(meta["next_id"])
+        stand.sample_ids = [int(i) for i in meta["sample_ids"]]
+        stand.rows = table.Trees(
+            **{name: np.array(arrays[f"tree_{name}"]) for name in table.Trees._fields}
+        )
+        rows = stand.rows
+        size = rows.size.copy()
+        rows.size[:] = 0
+        rows.room[:] = 0
+        stand.arena.make_room(rows.start, rows.size, rows.room, size.astype(np.int64))
+        at = 0
+        for row, n in enumerate(size):
+            s = int(rows.start[row])
+            for name, field in stand.arena.metamers._asdict().items():
+                field[s : s + n] = arrays[f"metamer_{name}"][at : at + n]
+            at += int(n)
+        rows.size[:] = size
+        stand._surroundings.restore(arrays)
+        return stand
+
+
+def _measure_species(stand: Stand) -> MeasureSpecies:
+    species = stand.species
+
+    def each(section: str, key: str, scale: float = 1.0) -> NDArray[np.float64]:
+        return np.array([scale * getattr(getattr(s, section), key) for s in species], np.float64)
+
+    return MeasureSpecies(
+        pipe_exponent=stand._traits.pipe_exponent,
+        bark_factor=each("mensuration", "bark_factor"),
+        density_kg_m3=each("wood", "density_kg_m3"),
+        leaf_area_m2=each("leaves", "area_m2"),
+        sla_m2_kg=each("leaves", "sla_m2_kg"),
+        merchantable_top_m=each("mensuration", "merchantable_top_cm", 0.01),
+        stump_height_m=each("mensuration", "stump_height_m"),
+    )

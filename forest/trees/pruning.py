@@ -1,0 +1,67 @@
+"""Cutting a part off a tree between two years."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forest.errors import InputError
+from forest.trees.metamers import BRANCHED, CONTINUED, MAIN, Metamers
+from forest.trees.table import Trees
+
+
+def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int) -> int:
+    """Remove a metamer and everything it carries, and close the gap in the tree's extent.
+
+    Parameters
+    ----------
+    arena : Metamers
+        The arena; changed in place.
+    trees : Trees
+        The tree table; `size` is changed in place.
+    row : int
+        Row of the tree.
+    serial : int
+        Serial number of the lowest metamer that goes.
+
+    Returns
+    -------
+    int
+        Metamers removed.
+
+    Raises
+    ------
+    InputError
+        If no metamer has that serial, or if it is the tree's first.
+    """
+    start, n = int(trees.start[row]), int(trees.size[row])
+    part = slice(start, start + n)
+    at = np.flatnonzero(arena.serial[part] == serial)
+    tree_id = int(trees.tree_id[row])
+    if at.size == 0:
+        raise InputError(
+            f"tree {tree_id} has no metamer {serial}",
+            where="Stand.prune",
+            expected="a serial number of the tree's skeleton",
+        )
+    cut = int(at[0])
+    parent = arena.parent[part].copy()
+    if parent[cut] < 0:
+        raise InputError(
+            f"metamer {serial} carries the whole tree {tree_id}",
+            where="Stand.prune",
+            expected="a metamer above it; use Stand.fell to remove a tree",
+        )
+    gone = np.zeros(n, np.bool_)
+    gone[cut] = True
+    for i in range(cut + 1, n):
+        gone[i] = gone[parent[i]]
+    bit = CONTINUED if arena.state[start + cut] & MAIN else BRANCHED
+    arena.state[start + parent[cut]] &= np.uint8(255 - bit)
+    stays = np.flatnonzero(~gone)
+    new_index = np.cumsum(~gone) - 1
+    for field in arena:
+        field[start : start + stays.size] = field[part][stays]
+    kept = arena.parent[start : start + stays.size]
+    kept[1:] = new_index[kept[1:]]
+    trees.size[row] = stays.size
+    return int(gone.sum())

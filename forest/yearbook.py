@@ -1,0 +1,250 @@
+"""The record of a year: what the stand writes into the run file's tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest.growth import budget
+from forest.measure.rings import ring_rows, ring_widths
+from forest.measure.stand import Flows, Plot, stand_rows
+from forest.measure.trees import TreeMeasures
+from forest.record.samples import SampleYear
+from forest.record.schema import CAUSES, EVENT_KINDS
+from forest.trees import table
+from forest.trees.metamers import LATERAL, MAIN, TERMINAL
+
+if TYPE_CHECKING:
+    from forest.stand import Stand
+
+Columns = dict[str, NDArray[Any]]
+
+_SQUARE_METRES_PER_HECTARE = 10_000.0
+
+
+class Event(NamedTuple):
+    """Something that happened to a tree."""
+
+    tree_id: int
+    species: int
+    kind: str
+    cause: str
+    mother_id: int
+    dbh_cm: float
+    height_m: float
+    volume_m3: float
+
+    @classmethod
+    def of(cls, stand: Stand, row: int, kind: str, cause: str, measures: TreeMeasures) -> Event:
+        """Note an event of the tree in a row of the table."""
+        return cls(
+            int(stand.rows.tree_id[row]),
+            int(stand.rows.species[row]),
+            kind,
+            cause,
+            int(stand.rows.mother_id[row]),
+            float(measures.dbh_cm[row]),
+            float(measures.height_m[row]),
+            float(measures.stem_volume_m3[row]),
+        )
+
+
+class YearRecord(NamedTuple):
+    """One year of a stand.
+
+    Attributes
+    ----------
+    year : int
+        Calendar year.
+    tables : dict of table to columns
+        The year's rows of `/trees`, `/stand`, `/events`, `/rings` and `/carbon`.
+    samples : dict of tree id to SampleYear
+        The year in the lives of the sample trees.
+    """
+
+    year: int
+    tables: dict[str, Columns]
+    samples: dict[int, SampleYear]
+
+
+def record_year(
+    stand: Stand,
+    measures: TreeMeasures,
+    dead: list[tuple[int, str]],
+    accounts: NDArray[np.float64],
+    serials_before: dict[int, NDArray[np.int32]],
+) -> YearRecord:
+    """Write down the year that has just been grown.
+
+    Parameters
+    ----------
+    stand : Stand
+        After growth; trees that die this year are still in its table.
+    measures : TreeMeasures
+        Of all rows.
+    dead : list of (row, cause)
+        The rows that die.
+    accounts : float64 (rows, ACCOUNTS)
+        The year's carbon accounts, kg per tree.
+    serials_before : dict
+        Serials of the sample trees' metamers before the year.
+    """
+    rows = stand.rows
+    alive = np.ones(len(rows.tree_id), np.bool_)
+    alive[[row for row, _ in dead]] = False
+    living = table.keep(rows, alive)
+    of_living = TreeMeasures(*(column[alive] for column in measures))
+    events = [
+        *stand.pending,
+        *(Event.of(stand, row, "died", cause, measures) for row, cause in dead),
+    ]
+    chosen = choose_samples(stand, living, of_living)
+    stand.sample_ids.extend(chosen)
+    plot = stand.scenario.plot
+    tables = {
+        "trees": _tree_rows(stand, living, of_living),
+        "stand": stand_rows(
+            stand.year,
+            of_living,
+            living.x,
+            living.y,
+            living.species,
+            _flows(events, len(stand.species)),
+            Plot(plot.size_m, plot.boundary == "periodic"),
+            stand.floor_light,
+        ),
+        "events": _event_rows(stand.year, events),
+        "rings": ring_rows(stand.year, stand.steps, living, of_living),
+        "carbon": _carbon_rows(stand, accounts),
+    }
+    return YearRecord(stand.year, tables, _sample_years(stand, dead, serials_before))
+
+
+def _tree_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Columns:
+    n = len(trees.tree_id)
+    columns: Columns = {
+        "year": np.full(n, stand.year, np.int32),
+        "tree_id": trees.tree_id,
+        "species": trees.species,
+        "x_m": trees.x,
+        "y_m": trees.y,
+        "age": stand.steps - trees.birth,
+        "status": np.zeros(n, np.int8),
+        "ring_width_mm": ring_widths(trees, measures),
+    }
+    hidden = ("breast_serial", "breast_birth", "breast_radius_m")
+    columns.update({k: v for k, v in measures._asdict().items() if k not in hidden})
+    return columns
+
+
+def _flows(events: list[Event], species: int) -> Flows:
+    def count(*kinds: str) -> NDArray[np.int64]:
+        return np.bincount([e.species for e in events if e.kind in kinds], minlength=species)
+
+    volume = np.zeros(species)
+    for event in events:
+        if event.kind == "felled":
+            volume[event.species] += event.volume_m3
+    return Flows(count("recruited"), count("died", "windthrown"), count("felled"), volume)
+
+
+def _event_rows(year: int, events: list[Event]) -> Columns:
+    return {
+        "year": np.full(len(events), year, np.int32),
+        "tree_id": np.array([e.tree_id for e in events], np.int32),
+        "species": np.array([e.species for e in events], np.int16),
+        "kind": np.array([EVENT_KINDS.index(e.kind) for e in events], np.int8),
+        "cause": np.array([CAUSES.index(e.cause) for e in events], np.int8),
+        "mother_id": np.array([e.mother_id for e in events], np.int32),
+        "dbh_cm": np.array([e.dbh_cm for e in events], np.float64),
+        "height_m": np.array([e.height_m for e in events], np.float64),
+        "volume_m3": np.array([e.volume_m3 for e in events], np.float64),
+    }
+
+
+def _carbon_rows(stand: Stand, accounts: NDArray[np.float64]) -> Columns:
+    k = len(stand.species)
+    width, depth = stand.scenario.plot.size_m
+    per_hectare = _SQUARE_METRES_PER_HECTARE / (width * depth)
+    columns: Columns = {
+        "year": np.full(k + 1, stand.year, np.int32),
+        "species": np.arange(k + 1, dtype=np.int16),
+    }
+    for name, column in (
+        ("income", budget.INCOME),
+        ("leaves", budget.LEAVES),
+        ("upkeep", budget.UPKEEP),
+        ("extension", budget.EXTENSION),
+        ("ring", budget.RING),
+        ("reserve_change", budget.RESERVE_CHANGE),
+    ):
+        sums = np.bincount(stand.rows.species, weights=accounts[:, column], minlength=k)
+        columns[name] = np.append(sums, sums.sum()) * per_hectare
+    return columns
+
+
+def choose_samples(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> list[int]:
+    """Choose the sample trees that are due: by id from the start, by dbh quantile in their year."""
+    wanted = stand.scenario.output.sample_trees
+    chosen = []
+    if stand.steps == 1:
+        chosen += [i for i in wanted.ids if i in trees.tree_id]
+    if wanted.dbh_quantiles and stand.year == wanted.at_year and len(trees.tree_id):
+        thickness = np.where(np.isnan(measures.dbh_cm), -1.0, measures.dbh_cm)
+        by_thickness = np.argsort(thickness, kind="stable")
+        for quantile in wanted.dbh_quantiles:
+            place = round(quantile * (len(by_thickness) - 1))
+            chosen.append(int(trees.tree_id[by_thickness[place]]))
+    return [i for i in dict.fromkeys(chosen) if i not in stand.sample_ids]
+
+
+def _sample_years(
+    stand: Stand, dead: list[tuple[int, str]], before: dict[int, NDArray[np.int32]]
+) -> dict[int, SampleYear]:
+    """Tell the year of each living sample tree; one that dies loses all its metamers."""
+    rows = stand.rows
+    dies = {row for row, _ in dead}
+    years = {}
+    for tree_id in stand.sample_ids:
+        row = int(np.searchsorted(rows.tree_id, tree_id))
+        known = before.get(tree_id)
+        if row == len(rows.tree_id) or rows.tree_id[row] != tree_id:
+            continue
+        years[tree_id] = _sample_year(stand, row, known, row in dies)
+    return years
+
+
+def _sample_year(
+    stand: Stand, row: int, known: NDArray[np.int32] | None, dies: bool
+) -> SampleYear:
+    rows = stand.rows
+    start, n = int(rows.start[row]), int(rows.size[row])
+    part = slice(start, start + n)
+    arena = stand.arena.metamers
+    serial = arena.serial[part].copy()
+    parent = arena.parent[part]
+    parent_serial = np.where(parent >= 0, serial[parent], -1).astype(np.int32)
+    base = np.array([rows.x[row], rows.y[row], 0.0])
+    new = np.ones(n, np.bool_) if known is None else ~np.isin(serial, known)
+    lost = np.empty(0, np.int32) if known is None else np.setdiff1d(known, serial)
+    state = arena.state[part]
+    exponent = float(stand.pipe_exponent[rows.species[row]])
+    if dies:
+        lost = np.union1d(lost, serial)
+    here = np.zeros(n, np.bool_) if dies else np.ones(n, np.bool_)
+    return SampleYear(
+        species=int(rows.species[row]),
+        base=base,
+        new_serial=serial[new],
+        new_parent_serial=parent_serial[new],
+        new_end=(arena.tip[part][new] + base).astype(np.float32),
+        new_order=arena.order[part][new],
+        new_main=(state[new] & MAIN) != 0,
+        new_birth_year=(arena.birth[part][new] + stand.scenario.start_year - 1).astype(np.int32),
+        dead_serial=lost.astype(np.int32),
+        serial=serial[here],
+        radius=(0.5 * arena.pipe[part][here] ** (1.0 / exponent)).astype(np.float32),
+        leafy=(state[here] & (TERMINAL | LATERAL)) != 0,
+    )
