@@ -1,0 +1,199 @@
+"""Where a bud sees the most light: the vector V of Palubicki et al. 2009, section 4.1."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from forest._jit import inline, njit, njit_parallel
+from forest.environment.light_grid import ShadowField, shadow_at
+from forest.environment.obstacles import Solid, solid_at
+
+CHUNKS = 64
+
+
+class Perception(NamedTuple):
+    """The voxels around a bud, nearest first, and how far and wide each species looks.
+
+    Attributes
+    ----------
+    offset : int64 (n, 3)
+        Offsets (x, y, z) from the bud's voxel; ties in distance in the order z, y, x.
+    unit : float32 (n, 3)
+        Unit vectors to them.
+    distance_m : float32 (n,)
+        Distances to them, m.
+    reach_m, cos_half_angle : float32 (species,)
+        Perception distance r, and cosine of half the perception angle theta.
+    """
+
+    offset: NDArray[np.int64]
+    unit: NDArray[np.float32]
+    distance_m: NDArray[np.float32]
+    reach_m: NDArray[np.float32]
+    cos_half_angle: NDArray[np.float32]
+
+
+def make_perception(
+    distance_m: NDArray[np.float64], angle_deg: NDArray[np.float64], voxel_m: float
+) -> Perception:
+    """List the voxels that any species' buds perceive.
+
+    The angle is the full opening of the cone. A bud always reaches its neighbouring voxels.
+    """
+    reach = np.maximum(distance_m, 1.75 * voxel_m)
+    n = int(np.floor(reach.max(initial=voxel_m) / voxel_m))
+    axis = np.arange(-n, n + 1)
+    z, y, x = (g.ravel() for g in np.meshgrid(axis, axis, axis, indexing="ij"))
+    squared = x * x + y * y + z * z
+    order = np.argsort(squared, kind="stable")[1:]
+    order = order[squared[order] * voxel_m**2 <= reach.max(initial=voxel_m) ** 2]
+    offset = np.column_stack((x, y, z))[order]
+    length = np.sqrt(squared[order])
+    return Perception(
+        np.ascontiguousarray(offset, np.int64),
+        np.ascontiguousarray(offset / length[:, None], np.float32),
+        (length * voxel_m).astype(np.float32),
+        reach.astype(np.float32),
+        np.cos(np.radians(angle_deg) / 2).astype(np.float32),
+    )
+
+
+@inline
+def _others_shadow(
+    field: Any, ix: Any, iy: Any, iz: Any, dx: Any, dy: Any, dz: Any, own: Any
+) -> Any:
+    """Read the shadow of a voxel near a bud without that bud's own pyramid."""
+    shadow = shadow_at(field, ix + dx, iy + dy, iz + dz)
+    depth = -dz
+    if depth >= 0 and depth < len(field.weights) and abs(dx) <= depth and abs(dy) <= depth:
+        shadow -= np.int64(field.weights[depth]) * own
+    return shadow
+
+
+@njit
+def _against_gradient(field: Any, ix: Any, iy: Any, iz: Any, own: Any, out: Any) -> None:
+    """Set a unit vector against the gradient of the shadow; zero where it is flat."""
+    x = _others_shadow(field, ix, iy, iz, -1, 0, 0, own) - _others_shadow(
+        field, ix, iy, iz, 1, 0, 0, own
+    )
+    y = _others_shadow(field, ix, iy, iz, 0, -1, 0, own) - _others_shadow(
+        field, ix, iy, iz, 0, 1, 0, own
+    )
+    z = _others_shadow(field, ix, iy, iz, 0, 0, -1, own) - _others_shadow(
+        field, ix, iy, iz, 0, 0, 1, own
+    )
+    length = np.sqrt(np.float64(x) ** 2 + np.float64(y) ** 2 + np.float64(z) ** 2)
+    if length == 0.0:
+        length = 1.0
+    out[0] = x / length
+    out[1] = y / length
+    out[2] = z / length
+
+
+@njit
+def _to_least_shadow(
+    field: Any, solid: Any, around: Any, species: Any, voxel: Any, heading: Any, own: Any, out: Any
+) -> None:
+    """Set a unit vector to the least shadowed free voxel of the cone; zero if all are alike."""
+    ix = np.int64(voxel[0])
+    iy = np.int64(voxel[1])
+    iz = np.int64(voxel[2])
+    here = _others_shadow(field, ix, iy, iz, 0, 0, 0, own)
+    reach = around.reach_m[species]
+    least = np.int64(2**62)
+    best = -1
+    differs = False
+    for k in range(len(around.distance_m)):
+        if around.distance_m[k] > reach:
+            break
+        cosine = (
+            around.unit[k, 0] * heading[0]
+            + around.unit[k, 1] * heading[1]
+            + around.unit[k, 2] * heading[2]
+        )
+        if cosine < around.cos_half_angle[species]:
+            continue
+        dx, dy, dz = around.offset[k]
+        if iz + dz < 0 or solid_at(solid, ix + dx, iy + dy, iz + dz):
+            continue
+        shadow = _others_shadow(field, ix, iy, iz, dx, dy, dz, own)
+        differs = differs or shadow != here
+        if shadow < least:
+            least = shadow
+            best = k
+    for axis in range(3):
+        out[axis] = around.unit[best, axis] if differs else np.float32(0.0)
+
+
+@njit_parallel
+def _directions(
+    field: Any,
+    solid: Any,
+    around: Any,
+    shade_units: Any,
+    species: Any,
+    voxel: Any,
+    heading: Any,
+    gradient: Any,
+) -> Any:
+    n = len(species)
+    out = np.empty((n, 3), np.float32)
+    for chunk in prange(CHUNKS):
+        for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
+            own = np.int64(shade_units[species[k]])
+            if gradient:
+                _against_gradient(
+                    field,
+                    np.int64(voxel[k, 0]),
+                    np.int64(voxel[k, 1]),
+                    np.int64(voxel[k, 2]),
+                    own,
+                    out[k],
+                )
+            else:
+                _to_least_shadow(
+                    field, solid, around, species[k], voxel[k], heading[k], own, out[k]
+                )
+    return out
+
+
+def preferred_directions(
+    field: ShadowField,
+    solid: Solid,
+    around: Perception,
+    shade_units: NDArray[np.uint16],
+    species: NDArray[np.int16],
+    voxel: NDArray[np.int32],
+    heading: NDArray[np.float32],
+    *,
+    mode: str,
+) -> NDArray[np.float32]:
+    """Give the direction of most light for each bud.
+
+    The bud's own pyramid is left out, as the bud's own shadow is in its light. The ground and
+    obstacles are not looked at.
+
+    Parameters
+    ----------
+    species, voxel, heading : int16 (n,), int32 (n, 3), float32 (n, 3)
+        Species, near-field voxel and unit direction of each bud.
+    mode : {"gradient", "least_shadow"}
+        Against the gradient of the shadow (central differences), or to the centre of the least
+        shadowed voxel in the perception volume (ties: the nearest, then in the order z, y, x).
+
+    Returns
+    -------
+    float32 (n, 3)
+        Unit vectors V; zero where all voxels are alike.
+
+    References
+    ----------
+    Palubicki et al. 2009, section 4.1.
+    """
+    return np.asarray(
+        _directions(field, solid, around, shade_units, species, voxel, heading, mode == "gradient")
+    )

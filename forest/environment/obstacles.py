@@ -1,0 +1,190 @@
+"""Boxes and meshes that block growth and cast shade, as a mask of near-field voxels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest._jit import inline
+from forest.environment.canopy import CanopyField
+from forest.errors import InputError
+
+
+@dataclass(frozen=True)
+class Box:
+    """An upright box.
+
+    Attributes
+    ----------
+    min_m, max_m : (float, float, float)
+        Opposite corners, m.
+    """
+
+    min_m: tuple[float, float, float]
+    max_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A closed surface in a file that pyvista reads, in metres.
+
+    Attributes
+    ----------
+    file : Path
+        STL, OBJ, PLY or VTP file.
+    """
+
+    file: Path
+
+
+class Solid(NamedTuple):
+    """Which near-field voxels are solid.
+
+    Attributes
+    ----------
+    mask : uint8 (nz, ny, nx)
+        1 where the voxel's centre lies inside an obstacle. One voxel stands for no obstacle.
+    origin : int32 (3,)
+        Voxel (ix, iy, iz) of the mask's first voxel.
+    periodic : int
+        1 on a torus.
+    shape : int64 (2,)
+        Voxels of the plot along x and y, at which a torus wraps.
+    """
+
+    mask: NDArray[np.uint8]
+    origin: NDArray[np.int32]
+    periodic: int
+    shape: NDArray[np.int64]
+
+
+@inline
+def solid_at(solid: Any, ix: Any, iy: Any, iz: Any) -> Any:
+    """Tell whether a near-field voxel lies inside an obstacle."""
+    mask = solid.mask
+    if mask.size == 1:
+        return False
+    nz, ny, nx = mask.shape
+    z = iz - solid.origin[2]
+    if z < 0 or z >= nz:
+        return False
+    y = iy - solid.origin[1]
+    x = ix - solid.origin[0]
+    if solid.periodic:
+        y %= solid.shape[1]
+        x %= solid.shape[0]
+    if y < 0 or y >= ny or x < 0 or x >= nx:
+        return False
+    return mask[z, y, x] != 0
+
+
+def no_solid() -> Solid:
+    """Give the mask of a plot without obstacles."""
+    return Solid(np.zeros((1, 1, 1), np.uint8), np.zeros(3, np.int32), 0, np.ones(2, np.int64))
+
+
+def voxelise(
+    obstacles: Sequence[Box | Mesh], shape: tuple[int, int], *, periodic: bool, voxel_m: float
+) -> Solid:
+    """Mark the voxels that obstacles fill.
+
+    A voxel is solid if its centre lies inside; a box fills at least one voxel along each axis.
+    What lies below the ground is left out; what leaves a periodic plot comes in on its other side.
+
+    Parameters
+    ----------
+    obstacles : sequence of Box or Mesh
+    shape : (int, int)
+        Voxels of the plot along x and y.
+    periodic : bool
+    voxel_m : float
+        Edge of a voxel, m.
+
+    Raises
+    ------
+    InputError
+        If a mesh cannot be read, is not closed, or holds no voxel.
+    """
+    parts = [
+        _box_voxels(o, voxel_m) if isinstance(o, Box) else _mesh_voxels(o, voxel_m)
+        for o in obstacles
+    ]
+    voxels = np.concatenate(parts) if parts else np.zeros((0, 3), np.int64)
+    voxels = voxels[voxels[:, 2] >= 0]
+    if len(voxels) == 0:
+        return no_solid()
+    nx, ny = shape
+    if periodic:
+        voxels[:, 0] %= nx
+        voxels[:, 1] %= ny
+        low = np.zeros(3, np.int64)
+        high = np.array([nx, ny, voxels[:, 2].max() + 2])
+    else:
+        low = voxels.min(axis=0)
+        # One layer more than needed, since a mask of one voxel stands for no obstacle.
+        high = voxels.max(axis=0) + (1, 1, 2)
+    mask = np.zeros(tuple((high - low)[::-1]), np.uint8)
+    x, y, z = (voxels - low).T
+    mask[z, y, x] = 1
+    return Solid(mask, low.astype(np.int32), int(periodic), np.array(shape, np.int64))
+
+
+def _box_voxels(box: Box, voxel_m: float) -> NDArray[np.int64]:
+    axes = []
+    for low, high in zip(box.min_m, box.max_m, strict=True):
+        first = int(np.rint(low / voxel_m))
+        last = int(np.rint(high / voxel_m))
+        if last <= first:
+            first = int(np.floor((low + high) / 2 / voxel_m))
+            last = first + 1
+        axes.append(np.arange(first, last, dtype=np.int64))
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _mesh_voxels(mesh: Mesh, voxel_m: float) -> NDArray[np.int64]:
+    import pyvista
+
+    try:
+        surface = pyvista.read(mesh.file).triangulate()
+    except (OSError, ValueError, AttributeError) as error:
+        raise InputError(
+            "cannot read this mesh", where=str(mesh.file), expected="an STL, OBJ, PLY or VTP file"
+        ) from error
+    if surface.n_points == 0 or surface.n_open_edges > 0:
+        raise InputError(
+            "the mesh is not closed", where=str(mesh.file), expected="a watertight surface"
+        )
+    bounds = np.asarray(surface.bounds).reshape(3, 2)
+    axes = [np.arange(np.floor(a / voxel_m), np.ceil(b / voxel_m)) for a, b in bounds]
+    voxels = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    centres = pyvista.PolyData((voxels + 0.5) * voxel_m)
+    inside = np.asarray(centres.select_interior_points(surface)["selected_points"], bool)
+    if not inside.any():
+        raise InputError(
+            "the mesh is smaller than a voxel", where=str(mesh.file), expected="metres as unit"
+        )
+    return voxels[inside].astype(np.int64)
+
+
+def solid_voxels(solid: Solid) -> NDArray[np.int64]:
+    """List the solid voxels as (ix, iy, iz), int64 (n, 3)."""
+    return np.argwhere(solid.mask)[:, ::-1] + solid.origin.astype(np.int64)
+
+
+def coarse_depth(voxels: NDArray[np.int64], far: CanopyField) -> NDArray[np.float32] | None:
+    """Give the optical depth of obstacles on the far field's grid, or None without any.
+
+    A coarse voxel lets the share through that is not solid; depth 80 stands for none at all.
+    """
+    if len(voxels) == 0 or far.ratio == 0:
+        return None
+    solid = np.zeros(far.leaf.shape, np.int64)
+    x, y, z = voxels.T // far.ratio
+    np.add.at(solid, (z, y - far.origin[1], x - far.origin[0]), 1)
+    free = 1.0 - solid / far.ratio**3
+    return (-np.log(np.maximum(free, np.exp(-80.0)))).astype(np.float32)
