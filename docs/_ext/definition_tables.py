@@ -1,7 +1,8 @@
 """Tables of the documentation that are written from the program's own definitions.
 
 `{scenario-keys}` and `{species-keys}` list every key with unit, default, range and meaning;
-`{species-values}` sets the shipped species side by side.
+`{species-values}` sets the shipped species side by side, `{species-sources}` says where the values
+come from. `{run-file-columns}` lists the run file's tables. `{pictures}` shows the gallery.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 import forest
+from forest.record.schema import columns_markdown
 from forest.scenario import Scenario
 from forest.species import Species, describe, load_species, species_names
 
@@ -78,6 +80,16 @@ def sources() -> str:
     return text
 
 
+def pictures() -> str:
+    """Show every picture that `gallery/captions.toml` has a caption for, in its order."""
+    folder = Path(__file__).parents[1] / "gallery"
+    captions = tomllib.loads((folder / "captions.toml").read_text())
+    return "\n".join(
+        f"```{{figure}} gallery/{name}.png\n:alt: {name}\n\n{caption}\n```\n"
+        for name, caption in captions.items()
+    )
+
+
 def _flat(table: dict[str, Any], prefix: str = "") -> Iterable[list[str]]:
     for key, value in table.items():
         if isinstance(value, dict):
@@ -97,9 +109,10 @@ def _short(value: Any) -> str:
 def _directive(text: Any) -> type[SphinxDirective]:
     class Generated(SphinxDirective):
         def run(self) -> list[nodes.Node]:
-            for module in ("scenario", "species"):
-                for source in (Path(forest.__file__).parent / module).iterdir():
+            for room in ("scenario", "species", "record"):
+                for source in (Path(forest.__file__).parent / room).glob("*.*"):
                     self.env.note_dependency(str(source))
+            self.env.note_dependency(str(Path(__file__).parents[1] / "gallery" / "captions.toml"))
             return self.parse_text_to_nodes(text(), allow_section_headings=True)
 
     return Generated
@@ -111,4 +124,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("species-keys", _directive(lambda: keys_by_table(Species)))
     app.add_directive("species-values", _directive(values_side_by_side))
     app.add_directive("species-sources", _directive(sources))
+    app.add_directive("run-file-columns", _directive(columns_markdown))
+    app.add_directive("pictures", _directive(pictures))
     return {"parallel_read_safe": True}
