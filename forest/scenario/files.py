@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from forest.errors import InputError, nearest
+from forest.errors import InputError
 from forest.species.schema import Refusal, read_text
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".vtp")
@@ -31,9 +31,9 @@ def _rows(
     """Read a CSV's rows with their line numbers; `columns` must be there."""
     path = _locate(file, context)
     try:
-        text = read_text(path)
+        text = read_text(path, where="")
     except InputError as error:
-        raise Refusal(str(error).removeprefix(f"{path}: "), expected="a CSV file") from None
+        raise Refusal(str(error)) from None
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     header: list[str] | None = None
     try:
@@ -111,9 +111,7 @@ def find_mesh(file: str, context: Any) -> str:
     """Check that a mesh file exists and is of a known kind; give its absolute path."""
     path = _locate(file, context)
     if path.suffix.lower() not in MESH_SUFFIXES:
-        raise Refusal(
-            f"{file!r} is not a known kind of mesh, {nearest(path.suffix, MESH_SUFFIXES)}"
-        )
+        raise Refusal(f"{file!r} is no mesh", expected=" | ".join(MESH_SUFFIXES))
     try:
         there = path.is_file()
     except (OSError, ValueError):

@@ -62,10 +62,8 @@ def regular_spots(
         max(int(edge / step + 1e-9), 1) for edge, step in zip(size_m, spacing_m, strict=True)
     )
     x, y = np.meshgrid(
-        np.minimum(
-            (np.arange(columns) + 0.5) * spacing_m[0], size_m[0] / 2 if columns == 1 else np.inf
-        ),
-        np.minimum((np.arange(rows) + 0.5) * spacing_m[1], size_m[1] / 2 if rows == 1 else np.inf),
+        (np.arange(columns) + 0.5) * min(spacing_m[0], size_m[0]),
+        (np.arange(rows) + 0.5) * min(spacing_m[1], size_m[1]),
     )
     return x.ravel(), y.ravel()
 

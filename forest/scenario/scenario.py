@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr, ValidationError, ValidationInfo, field_validator, model_validator
 
-from forest.errors import InputError, nearest
+from forest.errors import nearest
 from forest.scenario import files, placing
 from forest.scenario.model import (
     Environment,
@@ -37,6 +37,7 @@ from forest.species.schema import (
     Refusal,
     Table,
     as_plain,
+    input_error,
     parse_toml,
     quantity,
     read_text,
@@ -69,7 +70,7 @@ class Scenario(Table):
     title: str = quantity("", "what the run is about", unit="", max_length=1000)
     years: int = quantity(..., "years to simulate", unit="year", ge=1, le=10000)
     start_year: int = quantity(
-        2000, "calendar year of the planting", unit="year", ge=-20000, le=20000
+        2000, "first calendar year of growth", unit="year", ge=-20000, le=20000
     )
     seed: int = quantity(1, "seed of all random numbers", unit="", ge=0, le=2**63 - 1)
     mode: Literal["mass_balance", "paper"] = quantity(
@@ -127,7 +128,7 @@ class Scenario(Table):
             If the file cannot be read or is not a valid scenario.
         """
         path = Path(path)
-        return cls.from_toml(read_text(path), where=path.name, folder=path.parent)
+        return cls.from_toml(read_text(path, where=path.name), where=path.name, folder=path.parent)
 
     @classmethod
     def from_toml(cls, text: str, *, where: str = "scenario", folder: str | Path = ".") -> Scenario:
@@ -233,11 +234,14 @@ class Scenario(Table):
 
     @model_validator(mode="after")
     def _samples_in_time(self) -> Scenario:
-        year = self.output.sample_trees.at_year
-        last = self.start_year + self.years
-        if year is not None and not self.start_year <= year <= last:
+        samples = self.output.sample_trees
+        last = self.start_year + self.years - 1
+        if samples.at_year is None:
+            samples = samples.model_copy(update={"at_year": last})
+            self.__dict__["output"] = self.output.model_copy(update={"sample_trees": samples})
+        elif not self.start_year <= samples.at_year <= last:
             raise Refusal(
-                f"{year} is not a year of the run",
+                f"{samples.at_year} is not a year of the run",
                 key="output.sample_trees.at_year",
                 expected=f"a calendar year, {self.start_year} to {last}",
             )
@@ -361,6 +365,9 @@ def _embed_stem_map(planting: StemMap, info: ValidationInfo) -> Explicit:
         return Explicit(trees=(PlantedTree(x_m=0.0, y_m=0.0),))  # refused for plot or species
     spots = placing.Spots(plot.size_m, placing.SAME_SPOT_M, periodic=plot.boundary == "periodic")
     trees = []
+    if planting.species and planting.species not in species:
+        hint = nearest(planting.species, species)
+        raise Refusal(f"unknown species {planting.species[:60]!r}, {hint}", key="species")
     try:
         rows = files.read_stem_map(planting.file, planting.species, info.context)
     except Refusal as error:
@@ -406,14 +413,14 @@ def _set(data: dict[str, Any], override: str) -> None:
     path, sign, text = override.partition("=")
     keys = [key.strip() for key in path.split(".")]
     if not sign or not all(keys):
-        raise InputError(
+        raise input_error(
             f"{override!r} is not an override", where="--set", expected="key.path=value"
         )
     table = data
     for depth, key in enumerate(keys[:-1]):
         table = table.setdefault(key, {})
         if not isinstance(table, dict):
-            raise InputError(
+            raise input_error(
                 f"{'.'.join(keys[: depth + 1])!r} is not a table",
                 where=f"--set: {path}",
                 expected="the key of a table",

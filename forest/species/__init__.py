@@ -32,7 +32,7 @@ def shipped_table(name: str) -> dict[str, Any]:
     if name not in species_names():
         raise InputError(f"unknown species {name!r}, {nearest(name, species_names())}")
     path = _FOLDER / f"{name}.toml"
-    return parse_toml(read_text(path), where=str(path))
+    return parse_toml(read_text(path, where=name), where=path.name)
 
 
 def load_species(name: str) -> Species:

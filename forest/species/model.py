@@ -5,6 +5,7 @@ Symbols in the descriptions are those of Palubicki et al. 2009 unless a source i
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -14,7 +15,7 @@ from forest.species.schema import Refusal, Table, quantity
 
 
 def _ascending(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    for (before, _), (after, _) in zip(points, points[1:], strict=False):
+    for (before, _), (after, _) in pairwise(points):
         if after <= before:
             raise Refusal("the x of a curve does not rise", expected="points [x, y], x ascending")
     return points

@@ -87,27 +87,26 @@ def quantity(
 # --- reading -------------------------------------------------------------------------------
 
 
-def read_bytes(path: Path, *, where: str = "") -> bytes:
+def read_bytes(path: Path, *, where: str) -> bytes:
     """Read a file that the user named, or say in one line why it cannot be read."""
-    where = where or str(path)
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"no such file {str(path)!r}", where=where) from None
+        raise input_error(f"no such file {str(path)!r}", where=where) from None
     except IsADirectoryError:
-        raise InputError(f"{str(path)!r} is a folder", where=where, expected="a file") from None
+        raise input_error(f"{str(path)!r} is a folder", where=where, expected="a file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot read {str(path)!r}: {reason}", where=where) from None
+        raise input_error(f"cannot read {str(path)!r}: {reason}", where=where) from None
 
 
-def read_text(path: Path, *, where: str = "") -> str:
+def read_text(path: Path, *, where: str) -> str:
     """Read a UTF-8 text file that the user named."""
     try:
         return read_bytes(path, where=where).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(
-            f"byte {error.start} is not UTF-8", where=where or str(path), expected="a text file"
+        raise input_error(
+            f"byte {error.start} of {str(path)!r} is not UTF-8", where=where, expected="a text file"
         ) from None
 
 
@@ -116,10 +115,19 @@ def parse_toml(text: str, *, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"not TOML: {str(error) or 'nested too deep'}", where=where) from None
+        raise input_error(f"not TOML: {str(error) or 'nested too deep'}", where=where) from None
 
 
 # --- messages ------------------------------------------------------------------------------
+
+
+def input_error(what: str, *, where: str = "", expected: str = "") -> InputError:
+    """Make an `InputError` whose text, quoted from any file, can be printed."""
+    return InputError(_printable(what), where=_printable(where), expected=_printable(expected))
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def refusal(error: ValidationError, model: type[BaseModel], *, where: str) -> InputError:
@@ -133,21 +141,22 @@ def refusal(error: ValidationError, model: type[BaseModel], *, where: str) -> In
     own = first.get("ctx", {}).get("error")
     if isinstance(own, Refusal):
         key = place.key + ("." if place.key and own.key else "") + own.key
-        return InputError(own.what, where=_join(where, key), expected=own.expected)
+        return input_error(own.what, where=_join(where, key), expected=own.expected)
     if first["type"] == "extra_forbidden":
         hint = nearest(str(first["loc"][-1]), place.siblings)
-        return InputError(
+        return input_error(
             f"unknown key {first['loc'][-1]!r}, {hint}", where=_join(where, place.key)
         )
+    last = first["loc"][-1] if first["loc"] else ""
     if first["type"] == "missing":
-        what = f"missing key {str(first['loc'][-1])!r}"
+        what = "missing entry" if isinstance(last, int) else f"missing key {last!r}"
     elif first["type"] == "union_tag_not_found":
         what = "missing key 'kind'"
     elif first["type"] == "union_tag_invalid":
         what = f"unknown kind {_brief(first['ctx']['tag'])}"
     else:
         what = f"{_brief(first['input'])} is not allowed"
-    return InputError(what, where=_join(where, place.key), expected=place.expected or first["msg"])
+    return input_error(what, where=_join(where, place.key), expected=place.expected or first["msg"])
 
 
 def _join(where: str, key: str) -> str:
