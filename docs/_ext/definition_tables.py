@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -31,28 +30,31 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     )
 
 
-def keys_by_table(model: Any) -> str:
-    """List the keys of a model, one Markdown table for each table of the file."""
-    text = ""
-    rows = describe(model)
-    for table, group in groupby(rows, key=lambda row: row.key.rpartition(".")[0]):
-        title = f"`[{table}]`" if table else "Top level"
-        text += f"### {title}\n\n" + markdown_table(
-            ["key", "type", "unit", "default", "range", "meaning"],
+def keys_by_table(model: Any, leave_out: str = "") -> str:
+    """List the keys of a model, one Markdown table for each table of the file.
+
+    Tables whose dotted name starts with `leave_out` are described elsewhere.
+    """
+    tables: dict[str, list[list[str]]] = {}
+    for row in describe(model):
+        table, _, key = row.key.rpartition(".")
+        if leave_out and table.startswith(leave_out):
+            continue
+        tables.setdefault(table, []).append(
             [
-                [
-                    f"`{row.key.rpartition('.')[2]}`",
-                    row.type,
-                    "" if row.unit == "1" else row.unit,
-                    f"`{row.default}`" if row.default not in ("", "required") else row.default,
-                    row.range,
-                    row.description,
-                ]
-                for row in group
-            ],
+                f"`{key}`",
+                row.type,
+                "" if row.unit == "1" else row.unit,
+                f"`{row.default}`" if row.default not in ("", "required") else row.default,
+                row.range,
+                row.description,
+            ]
         )
-        text += "\n"
-    return text
+    header = ["key", "type", "unit", "default", "range", "meaning"]
+    return "\n".join(
+        f"### {f'`[{table}]`' if table else 'Top level'}\n\n{markdown_table(header, rows)}"
+        for table, rows in tables.items()
+    )
 
 
 def values_side_by_side() -> str:
@@ -120,7 +122,9 @@ def _directive(text: Any) -> type[SphinxDirective]:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the directives with Sphinx."""
-    app.add_directive("scenario-keys", _directive(lambda: keys_by_table(Scenario)))
+    app.add_directive(
+        "scenario-keys", _directive(lambda: keys_by_table(Scenario, "species.<name>."))
+    )
     app.add_directive("species-keys", _directive(lambda: keys_by_table(Species)))
     app.add_directive("species-values", _directive(values_side_by_side))
     app.add_directive("species-sources", _directive(sources))
