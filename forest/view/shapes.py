@@ -159,7 +159,8 @@ def gather_leaves(skeletons: Sequence[Skeleton], most: int) -> tuple[Leaves, flo
     columns: list[tuple[NDArray[np.float64], ...]] = []
     for tree in skeletons:
         sites = np.flatnonzero(tree.leafy)
-        sites = sites[np.modf(np.arange(len(sites)) * share)[0] < share]
+        count = np.arange(len(sites) + 1) * share + np.modf(tree.tree_id * _GOLDEN)[0]
+        sites = sites[np.diff(np.floor(count)) > 0.0]
         look = look_of(tree.species)
         tint = 0.85 + 0.3 * np.modf(tree.tree_id * _GOLDEN)[0]  # trees differ a little
         hue = np.asarray(look.leaf) * tint
@@ -175,4 +176,4 @@ def gather_leaves(skeletons: Sequence[Skeleton], most: int) -> tuple[Leaves, flo
     if not columns:
         return Leaves(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool)), 1.0
     leaves = Leaves(*(np.concatenate(column) for column in zip(*columns, strict=True)))
-    return leaves, share**-0.5
+    return leaves, float(np.sqrt(total / max(len(leaves.place), 1)))
