@@ -77,6 +77,6 @@ def shade(
     """Light colours (n, 3) by warm sun and bluish sky, and give them as bytes."""
     warm = np.array([1.02, 0.96, 0.80])
     cool = np.array([0.40, 0.45, 0.52])
-    lit = colour * (sun[:, None] * warm + sky[:, None] * cool + 0.06)
+    lit = colour * (sun[:, None] * warm + sky[:, None] * cool + 0.12)
     # Screens are not linear: the eye sees shade brighter than the light is.
     return np.asarray(255.0 * np.clip(lit, 0.0, 1.0) ** 0.85, np.uint8)
