@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from forest.errors import InputError
-from forest.species.schema import Refusal, read_text
+from forest.species.schema import Refusal
+from forest.species.text import read_text
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".vtp")
 _LIMIT_M = 1e5

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from pydantic import PrivateAttr, ValidationError, ValidationInfo, field_validator, model_validator
 
 from forest.errors import nearest
-from forest.scenario import files, placing
+from forest.scenario import placing
+from forest.scenario.complete import check_inside, complete, embed_stem_map
 from forest.scenario.model import (
     Environment,
     Explicit,
     Growth,
     Obstacle,
     Output,
-    PlantedTree,
     Planting,
     Plot,
     Random,
@@ -31,23 +31,12 @@ from forest.scenario.model import (
     StemMap,
     Weather,
 )
-from forest.species import shipped_table, species_names
-from forest.species.model import SECTIONS, Species
-from forest.species.schema import (
-    Refusal,
-    Table,
-    as_plain,
-    input_error,
-    parse_toml,
-    quantity,
-    read_text,
-    refusal,
-    to_toml,
-)
+from forest.species.model import Species
+from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
+from forest.species.text import input_error, parse_toml, read_text, to_toml
 
 #: A periodic grid of more columns of voxels than this fits no memory.
 _MOST_COLUMNS = 250_000_000
-_OVERRIDE = "set in the scenario"
 
 
 class Scenario(Table):
@@ -149,13 +138,13 @@ class Scenario(Table):
         species = as_plain(species)
         if not isinstance(species, dict):
             return species
-        return {name: _complete(name, given) for name, given in species.items()}
+        return {name: complete(name, given) for name, given in species.items()}
 
     @field_validator("planting")
     @classmethod
     def _read_stem_map(cls, planting: Planting, info: ValidationInfo) -> Planting:
         if isinstance(planting, StemMap):
-            return _embed_stem_map(planting, info)
+            return embed_stem_map(planting, info)
         return planting
 
     @model_validator(mode="after")
@@ -217,7 +206,7 @@ class Scenario(Table):
         spots = placing.Spots(self.plot.size_m, placing.SAME_SPOT_M, periodic=periodic)
         for i, tree in enumerate(planting.trees):
             key = f"planting.trees[{i}]"
-            _check_inside(tree.x_m, tree.y_m, self.plot, key=key)
+            check_inside(tree.x_m, tree.y_m, self.plot, key=key)
             if not tree.species and len(self.species) > 1:
                 raise Refusal("missing key 'species'", key=key, expected="a species' name")
             if tree.species and tree.species not in self.species:
@@ -324,81 +313,6 @@ class Scenario(Table):
 
     def __hash__(self) -> int:
         return hash(self.digest())
-
-
-def _complete(name: str, given: Any) -> Any:
-    """Complete a species of the scenario from the shipped one that it names."""
-    if not isinstance(given, dict):
-        return given
-    base = given.get("base", name)
-    if base not in species_names():
-        hint = nearest(str(base), species_names())
-        key = f"{name}.base" if "base" in given else name
-        raise Refusal(f"unknown species {str(base)[:60]!r}, {hint}", key=key)
-    if given.get("name", name) != name:
-        raise Refusal(
-            f"{given['name']!r} is not the table's name", key=f"{name}.name", expected=repr(name)
-        )
-    table = {**shipped_table(base), "name": name, "base": base}
-    own_sources = given.get("sources", {})
-    for key, value in given.items():
-        if key not in SECTIONS or not isinstance(value, dict):
-            if key != "sources":
-                table[key] = value
-            continue
-        changed = [k for k in value if value[k] != as_plain(table[key].get(k))]
-        table["sources"][key] = {**table["sources"][key], **dict.fromkeys(changed, _OVERRIDE)}
-        table[key] = {**table[key], **value}
-    if not isinstance(own_sources, dict):
-        table["sources"] = own_sources
-        return table
-    for section, entries in own_sources.items():
-        old = table["sources"].get(section, {})
-        table["sources"][section] = {**old, **entries} if isinstance(entries, dict) else entries
-    return table
-
-
-def _embed_stem_map(planting: StemMap, info: ValidationInfo) -> Explicit:
-    """Turn a stem map into explicit trees; its lines are checked here, where they are known."""
-    plot, species = info.data.get("plot"), info.data.get("species")
-    if plot is None or species is None:
-        return Explicit(trees=(PlantedTree(x_m=0.0, y_m=0.0),))  # refused for plot or species
-    spots = placing.Spots(plot.size_m, placing.SAME_SPOT_M, periodic=plot.boundary == "periodic")
-    trees = []
-    if planting.species and planting.species not in species:
-        hint = nearest(planting.species, species)
-        raise Refusal(f"unknown species {planting.species[:60]!r}, {hint}", key="species")
-    try:
-        rows = files.read_stem_map(planting.file, planting.species, info.context)
-    except Refusal as error:
-        raise Refusal(error.what, key="file", expected=error.expected) from None
-    for line, x, y, name in rows:
-        label = f"{planting.file!r} line {line}"
-        _check_inside(x, y, plot, key="file", label=f"{label}: ")
-        name = name or (next(iter(species)) if len(species) == 1 else "")
-        if name not in species:
-            hint = nearest(name, species)
-            what = f"unknown species {name[:60]!r}" if name else "no species"
-            raise Refusal(f"{label}, column 'species': {what}, {hint}", key="file")
-        other = spots.neighbour(x, y)
-        if other is not None:
-            raise Refusal(
-                f"{label} stands on the spot of line {other}",
-                key="file",
-                expected="trees 0.01 m or more apart",
-            )
-        spots.take(x, y, line)
-        trees.append(PlantedTree(x_m=x, y_m=y, species=name))
-    return Explicit(trees=tuple(trees))
-
-
-def _check_inside(x: float, y: float, plot: Plot, *, key: str, label: str = "") -> None:
-    if not (0 <= x <= plot.size_m[0] and 0 <= y <= plot.size_m[1]):
-        raise Refusal(
-            f"{label}({x:g}, {y:g}) is outside the plot",
-            key=key,
-            expected=f"x_m 0 to {plot.size_m[0]:g}, y_m 0 to {plot.size_m[1]:g}",
-        )
 
 
 def _as_given(data: Any) -> Any:

@@ -9,7 +9,8 @@ from pydantic import ValidationError
 
 from forest.errors import InputError, nearest
 from forest.species.model import Species
-from forest.species.schema import Row, describe, parse_toml, read_text, refusal
+from forest.species.schema import Row, describe, refusal
+from forest.species.text import parse_toml, read_text
 
 __all__ = ["Row", "Species", "describe", "load_species", "shipped_table", "species_names"]
 

@@ -7,10 +7,8 @@ carries its unit, range and description; `describe` turns a model into rows for 
 
 from __future__ import annotations
 
-import tomllib
 import types
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 import annotated_types
@@ -19,6 +17,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from forest.errors import InputError, nearest
+from forest.species.text import input_error, to_inline
+
+#: Nesting of tables and lists; the models need seven.
+_DEEPEST = 16
 
 
 class Refusal(ValueError):
@@ -48,14 +50,19 @@ class Table(BaseModel):
         return as_plain(data)
 
 
-def as_plain(data: Any) -> Any:
-    """Turn lists and arrays into tuples and NumPy scalars into Python's, at any depth."""
+def as_plain(data: Any, depth: int = 0) -> Any:
+    """Turn lists and arrays into tuples and NumPy scalars into Python's.
+
+    Tables deeper than any model's are refused before they exhaust the stack.
+    """
+    if depth > _DEEPEST:
+        raise Refusal("tables or lists nested too deep", expected=f"at most {_DEEPEST} levels")
     if hasattr(data, "tolist"):
         data = data.tolist()
     if isinstance(data, Mapping):
-        return {key: as_plain(value) for key, value in data.items()}
+        return {key: as_plain(value, depth + 1) for key, value in data.items()}
     if isinstance(data, list | tuple):
-        return tuple(as_plain(value) for value in data)
+        return tuple(as_plain(value, depth + 1) for value in data)
     return data
 
 
@@ -84,50 +91,7 @@ def quantity(
     return Field(default, description=description, json_schema_extra={"unit": unit}, **given)
 
 
-# --- reading -------------------------------------------------------------------------------
-
-
-def read_bytes(path: Path, *, where: str) -> bytes:
-    """Read a file that the user named, or say in one line why it cannot be read."""
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise input_error(f"no such file {str(path)!r}", where=where) from None
-    except IsADirectoryError:
-        raise input_error(f"{str(path)!r} is a folder", where=where, expected="a file") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise input_error(f"cannot read {str(path)!r}: {reason}", where=where) from None
-
-
-def read_text(path: Path, *, where: str) -> str:
-    """Read a UTF-8 text file that the user named."""
-    try:
-        return read_bytes(path, where=where).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise input_error(
-            f"byte {error.start} of {str(path)!r} is not UTF-8", where=where, expected="a text file"
-        ) from None
-
-
-def parse_toml(text: str, *, where: str) -> dict[str, Any]:
-    """Parse TOML or say in one line, with line and column, why it cannot be parsed."""
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise input_error(f"not TOML: {str(error) or 'nested too deep'}", where=where) from None
-
-
 # --- messages ------------------------------------------------------------------------------
-
-
-def input_error(what: str, *, where: str = "", expected: str = "") -> InputError:
-    """Make an `InputError` whose text, quoted from any file, can be printed."""
-    return InputError(_printable(what), where=_printable(where), expected=_printable(expected))
-
-
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def refusal(error: ValidationError, model: type[BaseModel], *, where: str) -> InputError:
@@ -378,52 +342,3 @@ def _default_text(field: FieldInfo) -> str:
     if value is None or value is PydanticUndefined or isinstance(value, BaseModel):
         return ""
     return to_inline(value)
-
-
-# --- writing -------------------------------------------------------------------------------
-
-
-def to_inline(value: Any) -> str:
-    """Write a plain value as TOML on one line."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, str):
-        return _quote(value)
-    if isinstance(value, Mapping):
-        pairs = (f"{_bare(k)} = {to_inline(v)}" for k, v in value.items() if v is not None)
-        return "{" + ", ".join(pairs) + "}"
-    return "[" + ", ".join(to_inline(item) for item in value) + "]"
-
-
-def to_toml(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:
-    """Write a nested table of plain values as TOML; entries that are None are left out."""
-    lines: list[str] = []
-    inner: list[str] = []
-    for key, value in table.items():
-        if value is None:
-            continue
-        if isinstance(value, Mapping):
-            inner.append(to_toml(value, (*path, key)))
-        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
-            rows = "".join(f"    {to_inline(item)},\n" for item in value)
-            lines.append(f"{_bare(key)} = [\n{rows}]\n")
-        else:
-            lines.append(f"{_bare(key)} = {to_inline(value)}\n")
-    header = f"\n[{'.'.join(_bare(part) for part in path)}]\n" if path else ""
-    if not lines and inner:
-        header = ""
-    return header + "".join(lines) + "".join(inner)
-
-
-def _bare(key: str) -> str:
-    plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if plain else _quote(key)
-
-
-def _quote(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return (
-        '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
-    )

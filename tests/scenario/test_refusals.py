@@ -58,6 +58,8 @@ def test_the_text_is_right_before_it_is_spoilt(tmp_path: Path) -> None:
         ("years = 10", f"years = {'9' * 3000}", ["years: 999"]),
         ("years = 10", f"years = {'9' * 5000}", ["not TOML"]),
         ("years = 10", f"years = {'[' * 5000}", ["not TOML"]),
+        ("years = 10", f"years = {'[' * 200}{']' * 200}", ["nested too deep"]),
+        ("years = 10", f"years = 10\nsite.{'a.' * 3000}b = 1", ["nested too deep"]),
         ("years = 10", "years = 10\nself = 1", ["unknown key 'self'"]),
         ("years = 10", 'years = 10\n"a\\nb" = 1', ["unknown key"]),
         ("years = 10", f"years = 10\n{BOX}max_m = [1, 1, 0]}}]", ["obstacles[0].max_m"]),
@@ -171,6 +173,7 @@ def test_stem_map(tmp_path: Path, stem_map: str | bytes, parts: list[str]) -> No
         ("years", "expected key.path=value"),
         ("plot..size_m=1", "expected key.path=value"),
         ("years.first=1", "'years' is not a table"),
+        ("site." + "a." * 3000 + "b=1", "nested too deep"),
         ("plot=open", "plot: 'open'"),
     ],
 )
