@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -14,18 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError, nearest
+from forest.record.identity import check_identity, check_run_file, damage_reported
 from forest.record.journal import JournaledFile, read_journal
-from forest.record.schema import ALL_TABLES, FILE_TYPE, SCHEMA_VERSION
-from forest.record.writer import check_run_file
+from forest.record.schema import ALL_TABLES
 from forest.trees.skeleton import Skeleton
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from forest.scenario import Scenario
-
-# What h5py raises on a file whose bytes are not what they were.
-_DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
 
 
 def open_run(path: str | Path) -> Run:
@@ -50,21 +46,11 @@ def open_run(path: str | Path) -> Run:
     """
     path = Path(path)
     check_run_file(path)
-    with _damage_reported(path):
+    with damage_reported(path):
         storage = JournaledFile(path, writable=False) if read_journal(path) else None
         file = h5py.File(storage or path, "r", **({} if storage else {"locking": False}))
         try:
-            if file.attrs.get("file_type") != FILE_TYPE:
-                raise InputError(
-                    "is HDF5, but not a run file", where=str(path), expected="a run file"
-                )
-            version = int(file.attrs["schema_version"])
-            if version > SCHEMA_VERSION:
-                raise InputError(
-                    f"is of schema version {version}",
-                    where=str(path),
-                    expected=f"a version up to {SCHEMA_VERSION}",
-                )
+            check_identity(file, path)
             return Run(path, file)
         except BaseException:
             file.close()
@@ -161,7 +147,7 @@ class Run:
             raise InputError(
                 f"no table '{table}'", where=str(self.path), expected=self._hint(table)
             )
-        with _damage_reported(self.path):
+        with damage_reported(self.path):
             known = [column.name for column in ALL_TABLES[table].columns]
             wanted = known if columns is None else list(columns)
             for name in wanted:
@@ -173,6 +159,10 @@ class Run:
             first, last = self._rows(table, years)
             data = {name: _column(self._file[table][name], first, last) for name in wanted}
             return pd.DataFrame(data, columns=wanted)
+
+    def count(self, table: str) -> int:
+        """Count the rows of one of `tables`."""
+        return int(self._ends[table][-1])
 
     @property
     def scenario_toml(self) -> str:
@@ -196,7 +186,7 @@ class Run:
         """Software, machine, seed, time and memory that made this run."""
         from forest.record.provenance import Provenance
 
-        with _damage_reported(self.path):
+        with damage_reported(self.path):
             text = self._file.attrs["provenance"]
             return Provenance.model_validate_json(text).model_dump(mode="json")
 
@@ -231,15 +221,14 @@ class Run:
                 f"tree {tree_id} is no sample tree", where=str(self.path), expected=expected
             )
         years = self._sample_years(tree_id)
-        found = np.flatnonzero(years == year)
-        if not found.size:
+        if year not in years:
             raise InputError(
                 f"tree {tree_id} is not on record in {year}",
                 where=str(self.path),
                 expected=f"a year from {years[0]} to {years[-1]}",
             )
-        with _damage_reported(self.path):
-            return self._shape(tree_id, int(found[0]))
+        with damage_reported(self.path):
+            return self._shape(tree_id, year)
 
     def close(self) -> None:
         """Close the file; tables already read stay."""
@@ -286,11 +275,16 @@ class Run:
         return int(ends[first]), int(ends[max(first, last)])
 
     def _sample_years(self, tree_id: int) -> NDArray[np.int32]:
-        years: NDArray[np.int32] = self._file[f"samples/{tree_id}/steps/year"][:]
-        return years[np.isin(years, self.years)]
+        """List the years at whose end a sample tree lived, of the whole years on file."""
+        steps = self._file[f"samples/{tree_id}/steps"]
+        years: NDArray[np.int32] = steps["year"][:]
+        living = np.diff(steps["radii"][:], prepend=0) > 0
+        living_years: NDArray[np.int32] = years[living & np.isin(years, self.years)]
+        return living_years
 
-    def _shape(self, tree_id: int, step: int) -> Skeleton:
+    def _shape(self, tree_id: int, year: int) -> Skeleton:
         group = self._file[f"samples/{tree_id}"]
+        step = int(np.flatnonzero(group["steps/year"][:] == year)[0])
         first = int(group["steps/radii"][step - 1]) if step else 0
         last = int(group["steps/radii"][step])
         made = int(group["steps/metamers"][step])
@@ -343,14 +337,3 @@ def _axes(parent: NDArray[np.int32], continues: NDArray[np.bool_]) -> NDArray[np
         first = first[first]
     number = np.cumsum(starts, dtype=np.int32) - 1
     return number[first].astype(np.int32)
-
-
-@contextlib.contextmanager
-def _damage_reported(path: Path) -> Iterator[None]:
-    """Turn what h5py raises on a damaged file into one line."""
-    try:
-        yield
-    except InputError:
-        raise
-    except _DAMAGE as error:
-        raise InputError("is cut short or damaged", where=str(path)) from error

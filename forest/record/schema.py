@@ -302,3 +302,7 @@ def columns_markdown() -> str:
             )
         parts.append("\n".join(lines))
     return "\n\n".join(parts) + "\n"
+
+
+if __name__ == "__main__":
+    print(columns_markdown(), end="")

@@ -18,6 +18,7 @@ from forest.errors import InputError, OutputError
 from forest.record import ledger
 from forest.record.checkpoint import remove_checkpoints
 from forest.record.columns import ColumnGroup
+from forest.record.identity import check_identity, check_run_file, damage_reported
 from forest.record.journal import JournaledFile, journal_path
 from forest.record.provenance import Provenance, Stopwatch, begin_session, end_session
 from forest.record.samples import SampleStore, SampleYear
@@ -202,10 +203,13 @@ class RunWriter:
         except OSError as error:
             raise OutputError.of(error, path) from error
         try:
-            return cls(path, storage, h5py.File(storage, "r+", libver=_FORMAT))
-        except (OSError, RuntimeError, KeyError) as error:
+            with damage_reported(path):
+                file = h5py.File(storage, "r+", libver=_FORMAT)
+                check_identity(file, path)
+                return cls(path, storage, file)
+        except InputError:
             storage.close()
-            raise InputError("is cut short or damaged", where=str(path)) from error
+            raise
 
     @property
     def path(self) -> Path:
@@ -254,28 +258,32 @@ class RunWriter:
         if "carbon" in tables:
             ledger.check_carbon(year, tables["carbon"])
         rows = {**tables, "population": population}
-        for name, table in self._tables.items():
-            if name in rows:
-                table.append(rows[name])
-        self._samples.append(year, samples or {})
-        # Two flushes, so that the step is the last thing to change in the file.
-        self._file.flush()
-        step = {"year": year, **self.row_counts()}
-        self._steps.append({name: np.array([value]) for name, value in step.items()})
-        self._commit()
+        try:
+            for name, table in self._tables.items():
+                if name in rows:
+                    table.append(rows[name])
+            self._samples.append(year, samples or {})
+            # Two flushes, so that the step is the last thing to change in the file.
+            self._file.flush()
+            step = {"year": year, **self.row_counts()}
+            self._steps.append({name: np.array([value]) for name, value in step.items()})
+            self._commit()
+        except BaseException:
+            self.close()  # some columns may be ahead of others: nothing more may be written
+            raise
 
     def finish(self) -> None:
         """Mark the run as complete, with the time and memory that it took, and close the file."""
-        self._end_session()
         self._file.attrs["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
-        self._commit()
-        self.close()
+        self.interrupt()
 
     def interrupt(self) -> None:
         """Close a run that will be resumed, with the time and memory that it took so far."""
         self._end_session()
-        self._commit()
-        self.close()
+        try:
+            self._commit()
+        finally:
+            self.close()
 
     def sync(self) -> None:
         """Wait until all years are on the disk; call it before writing a checkpoint."""
@@ -302,11 +310,7 @@ class RunWriter:
 
     def _commit(self) -> None:
         self._file.flush()
-        try:
-            self._storage.commit()
-        except OutputError:
-            self.close()
-            raise
+        self._storage.commit()
 
     def _trim(self, rows: Mapping[str, int], years_done: int) -> None:
         known = self.years_done
@@ -352,28 +356,6 @@ def check_target(path: Path, *, overwrite: bool) -> None:
         )
     if not path.parent.is_dir():
         raise OutputError(f"there is no folder '{path.parent}'", where=str(path))
-
-
-def check_run_file(path: Path) -> None:
-    """Refuse what is not a run file, in one line.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, empty, not HDF5, or cannot be read.
-    """
-    try:
-        with path.open("rb") as file:
-            head = file.read(8)
-    except FileNotFoundError as error:
-        raise InputError("no such file", where=str(path)) from error
-    except OSError as error:
-        reason = error.strerror or "failed"
-        raise InputError(f"cannot be read: {reason.lower()}", where=str(path)) from error
-    if not head:
-        raise InputError("is empty", where=str(path), expected="a run file")
-    if head != b"\x89HDF\r\n\x1a\n":
-        raise InputError("is not a run file", where=str(path), expected="a file made by forest run")
 
 
 def _chunk(rows: int) -> int:

@@ -1,0 +1,108 @@
+"""Tables of a run for other programs, and a run in a few lines."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from forest.errors import InputError, OutputError
+from forest.record.run import Run
+
+_SUFFIXES = (".csv", ".parquet")
+
+
+def export(run: Run, table: str, to: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a table of a run to a file of its own.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    table : str
+        One of its tables.
+    to : path
+        The file; its suffix, ``.csv`` or ``.parquet``, names the format.
+    overwrite : bool
+        Whether to replace a file.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If there is no such table, the suffix is another one, or the file exists.
+    OutputError
+        If it cannot be written. Nothing half-written is left behind.
+    """
+    to = Path(to)
+    suffix = to.suffix.lower()
+    if suffix not in _SUFFIXES:
+        expected = f"a name that ends in {' or '.join(_SUFFIXES)}"
+        raise InputError(f"unknown format '{suffix}'", where=str(to), expected=expected)
+    if to.is_dir():
+        raise InputError("is a folder", where=str(to), expected="the path of a file")
+    if to.exists() and not overwrite:
+        raise InputError("exists already", where=str(to), expected="a new path")
+    frame = run.read(table)
+    try:
+        # A folder of its own: the draft keeps the suffix, and the rights are the usual ones.
+        with tempfile.TemporaryDirectory(prefix=f".{to.name}.", dir=to.parent) as folder:
+            draft = Path(folder) / to.name
+            if suffix == ".csv":
+                frame.to_csv(draft, index=False)
+            else:
+                frame.to_parquet(draft, index=False)
+            draft.replace(to)
+    except OSError as error:
+        raise OutputError.of(error, to) from error
+    return to
+
+
+def info(run: Run) -> list[tuple[str, str]]:
+    """Describe a run in a few lines.
+
+    Returns
+    -------
+    list of (label, text)
+    """
+    provenance = run.provenance
+    sessions = provenance["sessions"]
+    last = sessions[-1]
+    seconds = sum(session["elapsed_s"] or 0.0 for session in sessions)
+    lines = [
+        ("file", f"{run.path} ({_size(run.path.stat().st_size)})"),
+        ("state", "complete" if run.complete else "not complete: forest run --resume goes on"),
+        ("years", _span(run)),
+        ("species", ", ".join(run.species_names)),
+        ("tables", ", ".join(f"{name} ({run.count(name):,})" for name in run.tables)),
+        ("sample trees", ", ".join(map(str, run.samples)) or "none"),
+        ("scenario", f"sha256 {provenance['scenario_sha256']}"),
+        ("seed", str(provenance["seed"])),
+        ("made by", f"forest {last['software']['forest']}, started {sessions[0]['started'][:19]}"),
+        (
+            "made on",
+            f"{last['environment']['platform']}, {last['environment']['threads']} threads"
+            f" of {last['environment']['cpu_count']} processors",
+        ),
+        ("time", f"{seconds:.1f} s in {len(sessions)} session(s)"),
+    ]
+    if last["peak_memory_bytes"]:
+        lines.append(("memory", f"{_size(last['peak_memory_bytes'])} at most"))
+    return lines
+
+
+def _span(run: Run) -> str:
+    if not len(run.years):
+        return "none yet"
+    return f"{run.years[0]} to {run.years[-1]} ({len(run.years)})"
+
+
+def _size(n_bytes: float) -> str:
+    for unit in ("B", "kB", "MB"):
+        if n_bytes < 1000:
+            return f"{n_bytes:.3g} {unit}"
+        n_bytes /= 1000
+    return f"{n_bytes:.3g} GB"
