@@ -16,7 +16,7 @@ _Edge = Annotated[float, Field(ge=0.5, le=10000)]
 _Spacing = Annotated[float, Field(ge=0.05, le=10000)]
 _Extent = Annotated[float, Field(gt=0, le=1e5)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
-_Id = Annotated[int, Field(ge=0, le=2**31 - 1)]
+_Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
 _TableName = Literal["trees", "stand", "events", "rings", "carbon"]
 
 
@@ -268,7 +268,9 @@ Obstacle = Annotated[Box | Mesh, Field(discriminator="kind")]
 class SampleTrees(Table):
     """Trees whose whole life is recorded."""
 
-    ids: tuple[_Id, ...] = quantity((), "tree ids", unit="", max_length=100_000)
+    ids: tuple[_Id, ...] = quantity(
+        (), "tree ids, counted from 1 in the order of planting", unit="", max_length=100_000
+    )
     dbh_quantiles: tuple[_Quantile, ...] = quantity(
         (), "quantiles of dbh among the trees that live at `at_year`", max_length=1000
     )
