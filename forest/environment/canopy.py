@@ -228,32 +228,39 @@ class CanopyField(NamedTuple):
     periodic: int
 
 
-@inline
-def add_leaf(field: Any, ix: Any, iy: Any, iz: Any, area: Any) -> None:
-    """Add leaf area, mm^2, at a near-field voxel (wrapped if the plot is a torus)."""
-    x = ix // field.ratio - field.origin[0]
-    y = iy // field.ratio - field.origin[1]
-    field.leaf[max(iz // field.ratio, 0), y, x] += area
+class Frame(NamedTuple):
+    """Where a far field's grid lies: see `CanopyField`."""
+
+    x: int
+    y: int
+    ratio: int
+    lift: int
 
 
 @inline
-def transmission_at(field: Any, ix: Any, iy: Any, iz: Any) -> Any:
+def frame_of(field: Any) -> Any:
+    """Take a field's place out of its arrays, for use in loops."""
+    return Frame(field.origin[0], field.origin[1], np.int64(field.ratio), np.int64(field.lift))
+
+
+@inline
+def transmission_at(transmission: Any, frame: Any, ix: Any, iy: Any, iz: Any) -> Any:
     """Read T `lift` near-field voxels above a site, linear in z between voxel centres."""
-    if field.ratio == 0:
+    if frame.ratio == 0:
         return np.float32(1.0)
-    x = ix // field.ratio - field.origin[0]
-    y = iy // field.ratio - field.origin[1]
-    twice = 2 * field.ratio
-    above = 2 * (iz + field.lift) + 1 - field.ratio
+    x = ix // frame.ratio - frame.x
+    y = iy // frame.ratio - frame.y
+    twice = 2 * frame.ratio
+    above = 2 * (iz + frame.lift) + 1 - frame.ratio
     z = above // twice
-    top = field.transmission.shape[0] - 1
+    top = transmission.shape[0] - 1
     if z < 0:
-        return field.transmission[0, y, x]
+        return transmission[0, y, x]
     if z >= top:
-        return field.transmission[top, y, x]
+        return transmission[top, y, x]
     share = np.float32(above - z * twice) / np.float32(twice)
-    low = field.transmission[z, y, x]
-    return low + share * (field.transmission[z + 1, y, x] - low)
+    low = transmission[z, y, x]
+    return low + share * (transmission[z + 1, y, x] - low)
 
 
 class Canopy:

@@ -9,7 +9,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from forest._jit import inline, njit, njit_parallel
-from forest.environment.light_grid import ShadowField, shadow_at
+from forest.environment.light_grid import ShadowField, shadow_at, window_of
 from forest.environment.obstacles import Solid, solid_at
 
 CHUNKS = 64
@@ -62,29 +62,37 @@ def make_perception(
     )
 
 
+class _Bud(NamedTuple):
+    """A bud's near-field voxel and the units of shade it casts."""
+
+    x: int
+    y: int
+    z: int
+    own: int
+
+
 @inline
-def _others_shadow(
-    field: Any, ix: Any, iy: Any, iz: Any, dx: Any, dy: Any, dz: Any, own: Any
-) -> Any:
+def _others_shadow(shadow: Any, window: Any, weights: Any, bud: Any, way: Any) -> Any:
     """Read the shadow of a voxel near a bud without that bud's own pyramid."""
-    shadow = shadow_at(field, ix + dx, iy + dy, iz + dz)
+    dx, dy, dz = way
+    found = shadow_at(shadow, window, bud.x + dx, bud.y + dy, bud.z + dz)
     depth = -dz
-    if depth >= 0 and depth < len(field.weights) and abs(dx) <= depth and abs(dy) <= depth:
-        shadow -= np.int64(field.weights[depth]) * own
-    return shadow
+    if depth >= 0 and depth < len(weights) and abs(dx) <= depth and abs(dy) <= depth:
+        found -= np.int64(weights[depth]) * bud.own
+    return found
 
 
 @njit
-def _against_gradient(field: Any, ix: Any, iy: Any, iz: Any, own: Any, out: Any) -> None:
+def _against_gradient(shadow: Any, window: Any, weights: Any, bud: Any, out: Any) -> None:
     """Set a unit vector against the gradient of the shadow; zero where it is flat."""
-    x = _others_shadow(field, ix, iy, iz, -1, 0, 0, own) - _others_shadow(
-        field, ix, iy, iz, 1, 0, 0, own
+    x = _others_shadow(shadow, window, weights, bud, (-1, 0, 0)) - _others_shadow(
+        shadow, window, weights, bud, (1, 0, 0)
     )
-    y = _others_shadow(field, ix, iy, iz, 0, -1, 0, own) - _others_shadow(
-        field, ix, iy, iz, 0, 1, 0, own
+    y = _others_shadow(shadow, window, weights, bud, (0, -1, 0)) - _others_shadow(
+        shadow, window, weights, bud, (0, 1, 0)
     )
-    z = _others_shadow(field, ix, iy, iz, 0, 0, -1, own) - _others_shadow(
-        field, ix, iy, iz, 0, 0, 1, own
+    z = _others_shadow(shadow, window, weights, bud, (0, 0, -1)) - _others_shadow(
+        shadow, window, weights, bud, (0, 0, 1)
     )
     length = np.sqrt(np.float64(x) ** 2 + np.float64(y) ** 2 + np.float64(z) ** 2)
     if length == 0.0:
@@ -96,37 +104,43 @@ def _against_gradient(field: Any, ix: Any, iy: Any, iz: Any, own: Any, out: Any)
 
 @njit
 def _to_least_shadow(
-    field: Any, solid: Any, around: Any, species: Any, voxel: Any, heading: Any, own: Any, out: Any
+    field: Any, solid: Any, around: Any, bud: Any, species: Any, heading: Any, out: Any
 ) -> None:
     """Set a unit vector to the least shadowed free voxel of the cone; zero if all are alike."""
-    ix = np.int64(voxel[0])
-    iy = np.int64(voxel[1])
-    iz = np.int64(voxel[2])
-    here = _others_shadow(field, ix, iy, iz, 0, 0, 0, own)
+    # Arrays are taken out of their tuples before the loop: each access would count references.
+    shadow = field.shadow
+    weights = field.weights
+    window = window_of(field)
+    offset = around.offset
+    unit = around.unit
+    distance = around.distance_m
     reach = around.reach_m[species]
+    narrow = around.cos_half_angle[species]
+    hx = heading[0]
+    hy = heading[1]
+    hz = heading[2]
+    obstructed = solid.mask.size > 1
+    here = _others_shadow(shadow, window, weights, bud, (0, 0, 0))
     least = np.int64(2**62)
     best = -1
     differs = False
-    for k in range(len(around.distance_m)):
-        if around.distance_m[k] > reach:
+    for k in range(len(distance)):
+        if distance[k] > reach:
             break
-        cosine = (
-            around.unit[k, 0] * heading[0]
-            + around.unit[k, 1] * heading[1]
-            + around.unit[k, 2] * heading[2]
-        )
-        if cosine < around.cos_half_angle[species]:
+        if unit[k, 0] * hx + unit[k, 1] * hy + unit[k, 2] * hz < narrow:
             continue
-        dx, dy, dz = around.offset[k]
-        if iz + dz < 0 or solid_at(solid, ix + dx, iy + dy, iz + dz):
+        way = (offset[k, 0], offset[k, 1], offset[k, 2])
+        if bud.z + way[2] < 0:
             continue
-        shadow = _others_shadow(field, ix, iy, iz, dx, dy, dz, own)
-        differs = differs or shadow != here
-        if shadow < least:
-            least = shadow
+        if obstructed and solid_at(solid, bud.x + way[0], bud.y + way[1], bud.z + way[2]):
+            continue
+        found = _others_shadow(shadow, window, weights, bud, way)
+        differs = differs or found != here
+        if found < least:
+            least = found
             best = k
     for axis in range(3):
-        out[axis] = around.unit[best, axis] if differs else np.float32(0.0)
+        out[axis] = unit[best, axis] if differs else np.float32(0.0)
 
 
 @njit_parallel
@@ -143,21 +157,20 @@ def _directions(
     n = len(species)
     out = np.empty((n, 3), np.float32)
     for chunk in prange(CHUNKS):
+        shadow = field.shadow
+        weights = field.weights
+        window = window_of(field)
         for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            own = np.int64(shade_units[species[k]])
+            bud = _Bud(
+                np.int64(voxel[k, 0]),
+                np.int64(voxel[k, 1]),
+                np.int64(voxel[k, 2]),
+                np.int64(shade_units[species[k]]),
+            )
             if gradient:
-                _against_gradient(
-                    field,
-                    np.int64(voxel[k, 0]),
-                    np.int64(voxel[k, 1]),
-                    np.int64(voxel[k, 2]),
-                    own,
-                    out[k],
-                )
+                _against_gradient(shadow, window, weights, bud, out[k])
             else:
-                _to_least_shadow(
-                    field, solid, around, species[k], voxel[k], heading[k], own, out[k]
-                )
+                _to_least_shadow(field, solid, around, bud, species[k], heading[k], out[k])
     return out
 
 
@@ -174,8 +187,8 @@ def preferred_directions(
 ) -> NDArray[np.float32]:
     """Give the direction of most light for each bud.
 
-    The bud's own pyramid is left out, as the bud's own shadow is in its light. The ground and
-    obstacles are not looked at.
+    The bud's own pyramid is left out, as the bud's own shadow is in its light. What lies below
+    the ground or in an obstacle is never chosen.
 
     Parameters
     ----------

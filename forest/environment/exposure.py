@@ -15,14 +15,20 @@ from numba import prange
 from numpy.typing import NDArray
 
 from forest._jit import inline, njit, njit_parallel
-from forest.environment.canopy import Canopy, CanopyField, add_leaf, transmission_at
+from forest.environment.canopy import Canopy, CanopyField, frame_of, transmission_at
 from forest.environment.directions import make_perception, preferred_directions
-from forest.environment.light_grid import UNIT, ShadowField, ShadowGrid, propagate, shadow_at
+from forest.environment.light_grid import (
+    UNIT,
+    ShadowField,
+    ShadowGrid,
+    propagate,
+    shadow_at,
+    window_of,
+)
 from forest.environment.obstacles import Box, Mesh, Solid, coarse_depth, solid_voxels, voxelise
 from forest.environment.sky import sky_directions, sun_directions
 from forest.environment.voxels import (
     HANDS,
-    Blocks,
     bound_blocks,
     count_buds,
     deal_blocks,
@@ -98,6 +104,12 @@ class Plot(NamedTuple):
 
 
 @inline
+def _three(column: Any, row: Any) -> Any:
+    """Take the three numbers of a row out of its array, for use in loops."""
+    return column[row, 0], column[row, 1], column[row, 2]
+
+
+@inline
 def _misses(low: Any, high: Any, first: Any, last: Any, plot: Any) -> Any:
     """Tell whether the rows low..high, wrapped on a torus, miss the rows first..last - 1."""
     if not plot.periodic:
@@ -120,31 +132,41 @@ def _deposit_block(
     units: Any,
 ) -> None:
     """Add the buds of a block that stand in a slab of rows to both grids."""
+    # Arrays are taken out of their tuples before the loop: each access would count references.
+    state = metamers.state
+    tip = metamers.tip
+    counts = near.counts
+    leaves = far.leaf
+    window = window_of(near)
+    frame = frame_of(far)
+    limit = np.int64(near.limit)
     shade = np.int64(units.shade[trees.species[tree]])
     leaf = np.int64(units.leaf[trees.species[tree]])
-    base = trees.base_voxel[tree]
-    offset = trees.base_offset[tree]
+    base_x, base_y, base_z = _three(trees.base_voxel, tree)
+    at_x, at_y, at_z = _three(trees.base_offset, tree)
     for k in range(sites[0], sites[1]):
-        buds = count_buds(metamers.state[k])
+        buds = count_buds(state[k])
         if buds == 0:
             continue
-        iy = site_voxel(base[1], offset[1], metamers.tip[k, 1], plot.voxel_m)
+        iy = site_voxel(base_y, at_y, tip[k, 1], plot.voxel_m)
         if plot.periodic:
             iy = wrap(iy, plot.ny)
         if iy < rows[0] or iy >= rows[1]:
             continue
-        ix = site_voxel(base[0], offset[0], metamers.tip[k, 0], plot.voxel_m)
+        ix = site_voxel(base_x, at_x, tip[k, 0], plot.voxel_m)
         if plot.periodic:
             ix = wrap(ix, plot.nx)
-        iz = site_voxel(base[2], offset[2], metamers.tip[k, 2], plot.voxel_m)
-        if near.limit > 0:
-            z = iz - near.origin[2]
-            y = iy - near.origin[1]
-            x = ix - near.origin[0]
-            count = np.int64(near.counts[z, y, x]) + shade * buds
-            near.counts[z, y, x] = np.uint16(min(count, near.limit))
-        if far.ratio > 0:
-            add_leaf(far, ix, iy, iz, leaf * buds)
+        iz = site_voxel(base_z, at_z, tip[k, 2], plot.voxel_m)
+        if limit > 0:
+            z = iz - window.z
+            y = iy - window.y
+            x = ix - window.x
+            counts[z, y, x] = np.uint16(min(np.int64(counts[z, y, x]) + shade * buds, limit))
+        if frame.ratio > 0:
+            z = max(iz // frame.ratio, 0)
+            y = iy // frame.ratio - frame.y
+            x = ix // frame.ratio - frame.x
+            leaves[z, y, x] += leaf * buds
 
 
 @njit_parallel
@@ -180,6 +202,45 @@ def deposit(
             )
 
 
+@njit
+def _read_block(
+    metamers: Any,
+    trees: Any,
+    tree: Any,
+    sites: Any,
+    plot: Any,
+    near: Any,
+    far: Any,
+    most: Any,
+) -> None:
+    """Set the light of a block's nodes; `most` is C plus a bud's own shadow."""
+    state = metamers.state
+    tip = metamers.tip
+    light = metamers.light
+    shadow = near.shadow
+    transmission = far.transmission
+    window = window_of(near)
+    frame = frame_of(far)
+    unit = near.unit
+    shaded = near.limit > 0
+    base_x, base_y, base_z = _three(trees.base_voxel, tree)
+    at_x, at_y, at_z = _three(trees.base_offset, tree)
+    for k in range(sites[0], sites[1]):
+        if count_buds(state[k]) == 0:
+            light[k] = np.float32(0.0)
+            continue
+        ix = site_voxel(base_x, at_x, tip[k, 0], plot.voxel_m)
+        iy = site_voxel(base_y, at_y, tip[k, 1], plot.voxel_m)
+        iz = site_voxel(base_z, at_z, tip[k, 2], plot.voxel_m)
+        if plot.periodic:
+            ix = wrap(ix, plot.nx)
+            iy = wrap(iy, plot.ny)
+        found = np.float64(transmission_at(transmission, frame, ix, iy, iz))
+        if shaded:
+            found *= max(most - unit * shadow_at(shadow, window, ix, iy, iz), 0.0)
+        light[k] = np.float32(found)
+
+
 @njit_parallel
 def read_light(
     metamers: Any,
@@ -195,23 +256,9 @@ def read_light(
     for hand in prange(HANDS):
         for block in range(hand, len(blocks.tree), HANDS):
             tree = blocks.tree[block]
-            base = trees.base_voxel[tree]
-            offset = trees.base_offset[tree]
-            most = full_light + near.unit * units.shade[trees.species[tree]] * near.weights[0]
-            for k in range(blocks.first[block], blocks.last[block]):
-                if count_buds(metamers.state[k]) == 0:
-                    metamers.light[k] = np.float32(0.0)
-                    continue
-                ix = site_voxel(base[0], offset[0], metamers.tip[k, 0], plot.voxel_m)
-                iy = site_voxel(base[1], offset[1], metamers.tip[k, 1], plot.voxel_m)
-                iz = site_voxel(base[2], offset[2], metamers.tip[k, 2], plot.voxel_m)
-                if plot.periodic:
-                    ix = wrap(ix, plot.nx)
-                    iy = wrap(iy, plot.ny)
-                light = np.float64(transmission_at(far, ix, iy, iz))
-                if near.limit > 0:
-                    light *= max(most - near.unit * shadow_at(near, ix, iy, iz), 0.0)
-                metamers.light[k] = np.float32(light)
+            own = near.unit * units.shade[trees.species[tree]] * near.weights[0]
+            sites = (blocks.first[block], blocks.last[block])
+            _read_block(metamers, trees, tree, sites, plot, near, far, full_light + own)
 
 
 def _no_shadow() -> ShadowField:

@@ -158,21 +158,45 @@ def propagate(field: Any) -> None:
         _shade_strip(field, strip * STRIP, min((strip + 1) * STRIP, ny))
 
 
+class Window(NamedTuple):
+    """Where a field's grid lies: its first voxel, the layers that hold shadow, its boundary."""
+
+    x: int
+    y: int
+    z: int
+    first_layer: int
+    last_layer: int
+    periodic: int
+
+
 @inline
-def shadow_at(field: Any, ix: Any, iy: Any, iz: Any) -> Any:
+def window_of(field: Any) -> Any:
+    """Take a field's place out of its arrays, for use in loops."""
+    return Window(
+        field.origin[0],
+        field.origin[1],
+        field.origin[2],
+        field.layers[0],
+        field.layers[1],
+        np.int64(field.periodic),
+    )
+
+
+@inline
+def shadow_at(shadow: Any, window: Any, ix: Any, iy: Any, iz: Any) -> Any:
     """Read the shadow of a voxel of the plot, in units of `unit`; 0 outside the grid."""
-    z = iz - field.origin[2]
-    if z < field.layers[0] or z >= field.layers[1]:
+    z = iz - window.z
+    if z < window.first_layer or z >= window.last_layer:
         return np.int64(0)
-    y = iy - field.origin[1]
-    x = ix - field.origin[0]
-    _, ny, nx = field.shadow.shape
+    y = iy - window.y
+    x = ix - window.x
+    _, ny, nx = shadow.shape
     if y < 0 or y >= ny or x < 0 or x >= nx:
-        if not field.periodic:
+        if not window.periodic:
             return np.int64(0)
         y %= ny
         x %= nx
-    return np.int64(field.shadow[z, y, x])
+    return np.int64(shadow[z, y, x])
 
 
 class ShadowGrid:

@@ -127,7 +127,7 @@ def voxelise(
     else:
         low = voxels.min(axis=0)
         # One layer more than needed, since a mask of one voxel stands for no obstacle.
-        high = voxels.max(axis=0) + (1, 1, 2)
+        high = voxels.max(axis=0) + np.array([1, 1, 2])
     mask = np.zeros(tuple((high - low)[::-1]), np.uint8)
     x, y, z = (voxels - low).T
     mask[z, y, x] = 1
@@ -173,7 +173,7 @@ def _mesh_voxels(mesh: Mesh, voxel_m: float) -> NDArray[np.int64]:
 
 def solid_voxels(solid: Solid) -> NDArray[np.int64]:
     """List the solid voxels as (ix, iy, iz), int64 (n, 3)."""
-    return np.argwhere(solid.mask)[:, ::-1] + solid.origin.astype(np.int64)
+    return np.asarray(np.argwhere(solid.mask)[:, ::-1] + solid.origin, np.int64)
 
 
 def coarse_depth(voxels: NDArray[np.int64], far: CanopyField) -> NDArray[np.float32] | None:

@@ -8,7 +8,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import inline, njit_parallel
+from forest._jit import inline, njit, njit_parallel
 from forest.trees.metamers import LATERAL, TERMINAL
 from forest.trees.table import Trees
 
@@ -69,6 +69,26 @@ def wrap(index: Any, n: Any) -> Any:
     return index
 
 
+@njit
+def _bound_tips(metamers: Any, first: Any, last: Any) -> Any:
+    """Bound the tips with living buds; rounding is monotone, so their voxels are bounded too."""
+    # Arrays are taken out of their tuple before loops: each access would count references.
+    state = metamers.state
+    tip = metamers.tip
+    infinite = np.float32(np.inf)
+    x0 = y0 = z0 = infinite
+    x1 = y1 = z1 = -infinite
+    for k in range(first, last):
+        if state[k] & (TERMINAL | LATERAL):
+            x0 = min(x0, tip[k, 0])
+            x1 = max(x1, tip[k, 0])
+            y0 = min(y0, tip[k, 1])
+            y1 = max(y1, tip[k, 1])
+            z0 = min(z0, tip[k, 2])
+            z1 = max(z1, tip[k, 2])
+    return (x0, y0, z0), (x1, y1, z1)
+
+
 @njit_parallel
 def bound_blocks(metamers: Any, trees: Any, blocks: Any, voxel_m: Any) -> Any:
     """Bound the voxels of the living buds of each block.
@@ -83,21 +103,13 @@ def bound_blocks(metamers: Any, trees: Any, blocks: Any, voxel_m: Any) -> Any:
     for hand in prange(HANDS):
         for block in range(hand, n, HANDS):
             tree = blocks.tree[block]
+            low, high = _bound_tips(metamers, blocks.first[block], blocks.last[block])
             for axis in range(3):
-                # Rounding and floor are monotone, so bounds of tips give bounds of voxels.
-                low = np.float32(np.inf)
-                high = np.float32(-np.inf)
-                for k in range(blocks.first[block], blocks.last[block]):
-                    if metamers.state[k] & (TERMINAL | LATERAL):
-                        tip = metamers.tip[k, axis]
-                        low = min(low, tip)
-                        high = max(high, tip)
-                if low <= high:
+                bounds[block, 2 * axis] = 1
+                bounds[block, 2 * axis + 1] = 0
+                if low[axis] <= high[axis]:
                     base = trees.base_voxel[tree, axis]
                     offset = trees.base_offset[tree, axis]
-                    bounds[block, 2 * axis] = site_voxel(base, offset, low, voxel_m)
-                    bounds[block, 2 * axis + 1] = site_voxel(base, offset, high, voxel_m)
-                else:
-                    bounds[block, 2 * axis] = 1
-                    bounds[block, 2 * axis + 1] = 0
+                    bounds[block, 2 * axis] = site_voxel(base, offset, low[axis], voxel_m)
+                    bounds[block, 2 * axis + 1] = site_voxel(base, offset, high[axis], voxel_m)
     return bounds
