@@ -44,7 +44,7 @@ def read_journal(path: Path) -> Changes:
         return {}
     magic, length, count, checksum = _HEADER.unpack_from(data)
     body = memoryview(data)[_HEADER.size :]
-    if magic != _MAGIC or zlib.crc32(body) != checksum or length > path.stat().st_size:
+    if magic != _MAGIC or zlib.crc32(body) != checksum or length != path.stat().st_size:
         return {}
     changes: Changes = {}
     at = 0

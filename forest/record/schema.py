@@ -196,7 +196,7 @@ CARBON = Table(
     (
         _YEAR,
         _SPECIES_OR_ALL,
-        _carbon("income", "photosynthesis less growth respiration"),
+        _carbon("income", "dry mass made from light"),
         _carbon("leaves", "spent on leaves"),
         _carbon("upkeep", "spent on the upkeep of sapwood"),
         _carbon("extension", "spent on new metamers"),

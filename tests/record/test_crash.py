@@ -78,7 +78,9 @@ def test_crash_at_any_write_leaves_whole_years(
         assert_whole(run, FIRST_YEAR + 6)
 
 
-def test_journal_cut_short_is_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_a_whole_journal_of_this_file_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "run.h5"
     writer = create(path)
     append(writer, FIRST_YEAR, FIRST_YEAR)
@@ -87,12 +89,18 @@ def test_journal_cut_short_is_ignored(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(Crash):
         append(writer, FIRST_YEAR + 1, FIRST_YEAR + 1)
     beside = journal.journal_path(path)
-    text = beside.read_bytes()
-    path.write_bytes(before)
-    for cut in (0, 10, 40, len(text) // 2, len(text) - 1):
-        beside.write_bytes(text[:cut])
+    whole = beside.read_bytes()
+    path.write_bytes(before + path.read_bytes()[len(before) :])  # appended, not yet changed
+    for cut in (0, 10, 40, len(whole) // 2, len(whole) - 1):
+        beside.write_bytes(whole[:cut])
         with open_run(path) as run:
             assert_whole(run, FIRST_YEAR)
+    beside.write_bytes(whole)
+    with open_run(path) as run:
+        assert_whole(run, FIRST_YEAR + 1)
+    path.write_bytes(before)  # an older copy of the file: the journal is not its own
+    with open_run(path) as run:
+        assert_whole(run, FIRST_YEAR)
 
 
 @pytest.mark.parametrize("trial", range(8))
