@@ -137,11 +137,15 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
             flow[i] = strand
             extension += volume * (primary * np.float64(length[i]) + strand * pipe_path[i])
             extension += t.leaf_mass[sp]
-            continue
-        sites = (1 if state[i] & _TERMINAL else 0) + (1 if state[i] & _LATERAL else 0)
-        if sites > 0:
-            earned = site_income(np.float64(arena.light[s + i]), path[i], rate, t.hydraulic_length[sp])
-            surplus[i] = sites * max(earned - leaf, 0.0)
+            if i > 0 and birth[parent[i]] != year.step:
+                surplus[parent[i]] += 1.0  # a bud that shot was a site when the year began
+        else:
+            surplus[i] += (1 if state[i] & _TERMINAL else 0) + (1 if state[i] & _LATERAL else 0)
+    for i in range(n):
+        if surplus[i] > 0.0:
+            light = np.float64(arena.light[s + i])
+            earned = site_income(light, path[i], rate, t.hydraulic_length[sp])
+            surplus[i] *= max(earned - leaf, 0.0)
             total += surplus[i]
     rest = max(accounts[row, SPEND] - extension, 0.0)
     support = reinforce(

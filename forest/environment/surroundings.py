@@ -1,0 +1,166 @@
+"""What a stand's buds know of light and space: the environments that a scenario names.
+
+Light fills `metamers.light` (Q); marker space marks the buds that have no room (their Q is 0).
+Where both are given a bud needs light and room, and grows towards its markers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from forest._jit import njit_parallel
+from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
+from forest.environment.marker_buds import BudSpace, apply_space
+from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
+from forest.environment.obstacles import Box, Mesh, Solid
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
+
+if TYPE_CHECKING:
+    from forest.growth.shoots import Shoots
+    from forest.scenario import Scenario
+
+_CHUNKS = 64
+
+
+class Surroundings:
+    """The environments of one stand.
+
+    Attributes
+    ----------
+    voxel_m : float
+        Edge of the near-field voxels in which trees' bases are given, m.
+    full_light : float
+        Light Q of an unshaded bud.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        spec = scenario.environment
+        species = scenario.species_list
+        periodic = scenario.plot.boundary == "periodic"
+        size_m = scenario.plot.size_m
+        internode = np.array([s.architecture.internode_length_m for s in species])
+        reach = internode * [s.shoots.perception_distance_internodes for s in species]
+        angle = np.array([s.shoots.perception_angle_deg for s in species])
+        if spec.shadow is not None:
+            self.voxel_m = spec.shadow.voxel_m
+        elif spec.canopy is not None:
+            self.voxel_m = spec.canopy.voxel_m
+        else:
+            assert spec.markers is not None
+            self.voxel_m = min(size_m) / max(1, round(min(size_m) / float(internode.min())))
+        self.full_light = spec.shadow.full_light if spec.shadow else 1.0
+        self._light = Light(
+            ShadowSpec(**spec.shadow.model_dump()) if spec.shadow else None,
+            CanopySpec(**spec.canopy.model_dump()) if spec.canopy else None,
+            size_m=size_m,
+            periodic=periodic,
+            voxel_m=self.voxel_m,
+            species=LightSpecies(
+                shade_factor=np.array([s.leaves.shade_factor for s in species]),
+                leaf_area_m2=np.array([s.leaves.area_m2 for s in species]),
+                perception_angle_deg=angle,
+                perception_distance_m=reach,
+            ),
+            latitude_deg=scenario.site.latitude_deg,
+            obstacles=[
+                Box(o.min_m, o.max_m) if o.kind == "box" else Mesh(Path(o.file))
+                for o in scenario.obstacles
+            ],
+        )
+        self._markers: MarkerSpace | None = None
+        if spec.markers is not None:
+            self._markers = MarkerSpace(
+                scenario.seed,
+                spec.markers.spacing_m,
+                size_m,
+                periodic,
+                spec.markers.release,
+                [Envelope(e.shape, e.center_m, e.size_m) for e in spec.markers.envelope],
+                np.array(spec.markers.clouds, np.float64).reshape(-1, 3),
+            )
+            occupancy = internode * [s.shoots.occupancy_radius_internodes for s in species]
+            self._marker_species = MarkerSpecies(
+                occupancy.astype(np.float32),
+                reach.astype(np.float32),
+                np.cos(0.5 * np.radians(angle)).astype(np.float32),
+            )
+        self._space: tuple[NDArray[np.int64], NDArray[np.float32]] | None = None
+
+    @property
+    def solid(self) -> Solid:
+        """The voxels that obstacles fill."""
+        return self._light.solid
+
+    def expose(self, metamers: Metamers, trees: Trees) -> None:
+        """Tell every bud how much light and room it has."""
+        self._light.expose(metamers, trees)
+        if self._markers is not None:
+            space = self._markers.claim(metamers, trees, self._marker_species)
+            apply_space(metamers, trees, space)
+            self._space = _by_serial(metamers, trees, space)
+
+    def directions(
+        self, metamers: Metamers, trees: Trees, shoots: Shoots, heading: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Give the optimal direction V of each shooting bud (float32 (n, 3)); zero if there is none."""
+        n_trees = len(trees.tree_id)
+        row = np.repeat(np.arange(n_trees), np.diff(shoots.first))
+        if self._space is not None:
+            keys, direction = self._space
+            serial = metamers.serial[trees.start[row] + shoots.metamer]
+            wanted = _key(trees.tree_id[row], serial, shoots.bud)
+            return direction[np.searchsorted(keys, wanted)]
+        voxel = np.empty((len(row), 3), np.int32)
+        _voxels(metamers, trees, row, shoots.metamer, np.float32(self.voxel_m), voxel)
+        return self._light.directions(trees.species[row], voxel, heading)
+
+    def floor_light(self) -> float:
+        """Mean relative irradiance at the ground, 0..1."""
+        return self._light.floor_light()
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What the next year needs of the environment, for a checkpoint."""
+        if self._markers is None:
+            return {}
+        return {f"markers_{name}": value for name, value in self._markers.state().items()}
+
+    def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Take back what `state` gave."""
+        if self._markers is not None:
+            start = "markers_"
+            self._markers.restore(
+                {k[len(start) :]: v for k, v in arrays.items() if k.startswith(start)}
+            )
+
+
+def _key(
+    tree_id: NDArray[np.int32], serial: NDArray[np.int32], bud: NDArray[np.uint8]
+) -> NDArray[np.int64]:
+    """Name a bud by one number that rises with tree, metamer and bud."""
+    return (tree_id.astype(np.int64) << 32) + (serial.astype(np.int64) << 1) + bud
+
+
+def _by_serial(
+    metamers: Metamers, trees: Trees, space: BudSpace
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Key each bud's direction by serial, so that it is found after shedding moved metamers."""
+    serial = metamers.serial[trees.start[space.tree_row] + space.metamer]
+    return _key(trees.tree_id[space.tree_row], serial, space.kind), space.direction
+
+
+@njit_parallel
+def _voxels(metamers: Any, trees: Any, row: Any, metamer: Any, voxel_m: Any, out: Any) -> None:
+    """Find the near-field voxel of each shooting bud, as the light does: in float32."""
+    n = len(row)
+    for c in prange(_CHUNKS):
+        for j in range(n * c // _CHUNKS, n * (c + 1) // _CHUNKS):
+            i = trees.start[row[j]] + metamer[j]
+            for k in range(3):
+                place = trees.base_offset[row[j], k] + metamers.tip[i, k]
+                out[j, k] = trees.base_voxel[row[j], k] + np.int32(np.floor(place / voxel_m))
