@@ -168,7 +168,7 @@ class Stand:
         )
         dead: list[tuple[int, str]] = []
         if not self._paper:
-            limit = self._traits.suppression_years[self.rows.species]
+            limit = self._traits.of["suppression_years"][self.rows.species]
             suppressed = self.rows.bad_years >= limit
             for row in np.flatnonzero(suppressed | (measures.buds == 0)):
                 dead.append((int(row), "suppression" if suppressed[row] else "no_buds"))
@@ -321,7 +321,7 @@ class Stand:
     @property
     def pipe_exponent(self) -> NDArray[np.float64]:
         """Pipe exponent n of each species, as used in this run: d = pipe^(1/n)."""
-        return self._traits.pipe_exponent
+        return np.ascontiguousarray(self._traits.of["pipe_exponent"])
 
     @property
     def _full_light(self) -> float:
@@ -441,7 +441,7 @@ def _measure_species(stand: Stand) -> MeasureSpecies:
         return np.array([scale * getattr(getattr(s, section), key) for s in species], np.float64)
 
     return MeasureSpecies(
-        pipe_exponent=stand._traits.pipe_exponent,
+        pipe_exponent=stand.pipe_exponent,
         bark_factor=each("mensuration", "bark_factor"),
         density_kg_m3=each("wood", "density_kg_m3"),
         leaf_area_m2=each("leaves", "area_m2"),

@@ -251,16 +251,12 @@ def transmission_at(transmission: Any, frame: Any, ix: Any, iy: Any, iz: Any) ->
     x = ix // frame.ratio - frame.x
     y = iy // frame.ratio - frame.y
     twice = 2 * frame.ratio
-    above = 2 * (iz + frame.lift) + 1 - frame.ratio
-    z = above // twice
+    above = max(2 * (iz + frame.lift) + 1 - frame.ratio, 0)
     top = transmission.shape[0] - 1
-    if z < 0:
-        return transmission[0, y, x]
-    if z >= top:
-        return transmission[top, y, x]
+    z = min(above // twice, top)
     share = np.float32(above - z * twice) / np.float32(twice)
     low = transmission[z, y, x]
-    return low + share * (transmission[z + 1, y, x] - low)
+    return low + min(share, np.float32(1.0)) * (transmission[min(z + 1, top), y, x] - low)
 
 
 class Canopy:

@@ -98,32 +98,45 @@ def _count_buds(metamers: Any, trees: Any, first_site: Any) -> Any:
 
 
 @njit
-def _write_bud(metamers: Any, trees: Any, buds: Any, b: Any, t: Any, k: Any, kind: Any) -> None:
-    """Fill entry `b` of the list with one bud of arena metamer `k`, tree row `t`."""
-    buds.tree_row[b] = t
-    buds.metamer[b] = k - trees.start[t]
-    buds.kind[b] = kind
-    buds.serial[b] = metamers.serial[k]
-    buds.species[b] = trees.species[t]
-    buds.position[b, 0] = trees.x[t] + np.float64(metamers.tip[k, 0])
-    buds.position[b, 1] = trees.y[t] + np.float64(metamers.tip[k, 1])
-    buds.position[b, 2] = np.float64(metamers.tip[k, 2])
-    if kind == KIND_LATERAL:
-        for axis in range(3):
-            buds.heading[b, axis] = metamers.bud[k, axis]
-        return
-    x = np.float64(metamers.tip[k, 0])
-    y = np.float64(metamers.tip[k, 1])
-    z = np.float64(metamers.tip[k, 2])
-    if metamers.parent[k] >= 0:
-        p = trees.start[t] + metamers.parent[k]
-        x -= np.float64(metamers.tip[p, 0])
-        y -= np.float64(metamers.tip[p, 1])
-        z -= np.float64(metamers.tip[p, 2])
+def _internode_direction(tip: Any, k: Any, parent: Any) -> Any:
+    """Unit vector from the parent's tip (the tree's base if `parent` < 0) to that of `k`."""
+    x = np.float64(tip[k, 0])
+    y = np.float64(tip[k, 1])
+    z = np.float64(tip[k, 2])
+    if parent >= 0:
+        x -= np.float64(tip[parent, 0])
+        y -= np.float64(tip[parent, 1])
+        z -= np.float64(tip[parent, 2])
     length = np.sqrt(x * x + y * y + z * z)
-    buds.heading[b, 0] = x / length
-    buds.heading[b, 1] = y / length
-    buds.heading[b, 2] = z / length
+    return x / length, y / length, z / length
+
+
+@njit
+def _fill_tree(metamers: Any, trees: Any, t: Any, first: Any, end: Any, b: Any, buds: Any) -> Any:
+    """List the buds of metamers `first` to `end` of tree row `t` from entry `b` on; give its end."""
+    tip, position, heading = metamers.tip, buds.position, buds.heading
+    start = trees.start[t]
+    for k in range(start + first, start + end):
+        for kind in range(2):
+            if not metamers.state[k] & (_TERMINAL if kind == 0 else _LATERAL):
+                continue
+            buds.tree_row[b] = t
+            buds.metamer[b] = k - start
+            buds.kind[b] = kind
+            buds.serial[b] = metamers.serial[k]
+            buds.species[b] = trees.species[t]
+            position[b, 0] = trees.x[t] + np.float64(tip[k, 0])
+            position[b, 1] = trees.y[t] + np.float64(tip[k, 1])
+            position[b, 2] = np.float64(tip[k, 2])
+            if kind == 0:
+                parent = metamers.parent[k]
+                p = start + parent if parent >= 0 else np.int64(-1)
+                heading[b, 0], heading[b, 1], heading[b, 2] = _internode_direction(tip, k, p)
+            else:
+                for axis in range(3):
+                    heading[b, axis] = metamers.bud[k, axis]
+            b += 1
+    return b
 
 
 @njit_parallel
@@ -133,16 +146,9 @@ def _fill_buds(metamers: Any, trees: Any, first_site: Any, first_bud: Any, buds:
         b = first_bud[c]
         while site < end:
             t = _tree_of(first_site, site)
-            shift = trees.start[t] - first_site[t]
             stop = min(end, first_site[t + 1])
-            for k in range(site + shift, stop + shift):
-                state = metamers.state[k]
-                if state & _TERMINAL:
-                    _write_bud(metamers, trees, buds, b, t, k, KIND_TERMINAL)
-                    b += 1
-                if state & _LATERAL:
-                    _write_bud(metamers, trees, buds, b, t, k, KIND_LATERAL)
-                    b += 1
+            tree = first_site[t]
+            b = _fill_tree(metamers, trees, t, site - tree, stop - tree, b, buds)
             site = stop
 
 

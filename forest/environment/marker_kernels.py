@@ -74,100 +74,81 @@ def _gather(
 
 
 @njit
+def _bounds(point: Any, n: Any) -> Any:
+    """Box around the first `n` points (3, n): low x, y, z, high x, y, z."""
+    low_x = high_x = point[0, 0]
+    low_y = high_y = point[1, 0]
+    low_z = high_z = point[2, 0]
+    for m in range(1, n):
+        low_x = min(low_x, point[0, m])
+        high_x = max(high_x, point[0, m])
+        low_y = min(low_y, point[1, m])
+        high_y = max(high_y, point[1, m])
+        low_z = min(low_z, point[2, m])
+        high_z = max(high_z, point[2, m])
+    return low_x, low_y, low_z, high_x, high_y, high_z
+
+
+@njit
+def _drop_within(point: Any, code: Any, n: Any, bx: Any, by: Any, bz: Any, radius2: Any) -> Any:
+    """Drop the markers within a sphere; give the number left."""
+    hits = 0
+    for m in range(n):
+        dx = point[0, m] - bx
+        dy = point[1, m] - by
+        dz = point[2, m] - bz
+        hits += dx * dx + dy * dy + dz * dz <= radius2
+    if hits == 0:
+        return n
+    left = 0
+    for m in range(n):
+        x = point[0, m]
+        y = point[1, m]
+        z = point[2, m]
+        dx, dy, dz = x - bx, y - by, z - bz
+        outside = dx * dx + dy * dy + dz * dz > radius2
+        point[0, left] = x
+        point[1, left] = y
+        point[2, left] = z
+        code[left] = code[m]
+        left += outside
+    return left
+
+
+@njit
 def _clear_occupied(
     lattice: Any, entries: Any, rows: Any, sites: Any, x: Any, y: Any, z: Any, free: Any, n: Any
 ) -> Any:
     """Drop the markers in the occupancy zone of any bud; give the number left."""
-    mx, my, mz = free.point[0], free.point[1], free.point[2]
-    code = free.code
+    at = entries.point
+    low_x, low_y, low_z, high_x, high_y, high_z = _bounds(free.point, n)
     for r in range(len(rows.offset)):
         start, end = row_bounds(lattice, entries.first, rows, r, x, y, z)
         for e in range(start, end):
             radius = sites.occupancy[entries.species[e]]
-            bx, by, bz = entries.point[e, 0], entries.point[e, 1], entries.point[e, 2]
-            left = 0
-            for m in range(n):
-                dx = mx[m] - bx
-                dy = my[m] - by
-                dz = mz[m] - bz
-                outside = dx * dx + dy * dy + dz * dz > radius * radius
-                mx[left] = mx[m]
-                my[left] = my[m]
-                mz[left] = mz[m]
-                code[left] = code[m]
-                left += outside
-            n = left
-            if n == 0:
+            bx, by, bz = at[e, 0], at[e, 1], at[e, 2]
+            dx = max(low_x - bx, bx - high_x, 0.0)
+            dy = max(low_y - by, by - high_y, 0.0)
+            dz = max(low_z - bz, bz - high_z, 0.0)
+            if dx * dx + dy * dy + dz * dz > radius * radius:
+                continue
+            left = _drop_within(free.point, free.code, n, bx, by, bz, radius * radius)
+            if left == 0:
                 return 0
+            if left < n:
+                n = left
+                low_x, low_y, low_z, high_x, high_y, high_z = _bounds(free.point, n)
     return n
 
 
 @njit
-def _precedes(buds: Any, a: Any, b: Any) -> Any:
+def _precedes(tree_row: Any, serial: Any, kind: Any, a: Any, b: Any) -> Any:
     """Order buds that are equally near: the lower tree, then serial number, terminal first."""
-    if buds.tree_row[a] != buds.tree_row[b]:
-        return buds.tree_row[a] < buds.tree_row[b]
-    if buds.serial[a] != buds.serial[b]:
-        return buds.serial[a] < buds.serial[b]
-    return buds.kind[a] < buds.kind[b]
-
-
-@njit
-def _bounding_sphere(free: Any, n: Any) -> Any:
-    """Centre and radius of a sphere around the free markers of a tile."""
-    low_x = high_x = free.point[0, 0]
-    low_y = high_y = free.point[1, 0]
-    low_z = high_z = free.point[2, 0]
-    for m in range(1, n):
-        low_x = min(low_x, free.point[0, m])
-        high_x = max(high_x, free.point[0, m])
-        low_y = min(low_y, free.point[1, m])
-        high_y = max(high_y, free.point[1, m])
-        low_z = min(low_z, free.point[2, m])
-        high_z = max(high_z, free.point[2, m])
-    x, y, z = high_x - low_x, high_y - low_y, high_z - low_z
-    radius = 0.5 * np.sqrt(x * x + y * y + z * z)
-    return 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), 0.5 * (low_z + high_z), radius
-
-
-@njit
-def _offer(entries: Any, sites: Any, buds: Any, e: Any, sphere: Any, free: Any, n: Any) -> None:
-    """Let one bud compete for the free markers of a tile that its perception cone holds."""
-    s = entries.species[e]
-    reach = sites.perception[s]
-    bx, by, bz = entries.point[e, 0], entries.point[e, 1], entries.point[e, 2]
-    dx, dy, dz = sphere[0] - bx, sphere[1] - by, sphere[2] - bz
-    distance2 = dx * dx + dy * dy + dz * dz
-    far = (reach + sphere[3]) * 1.00001
-    if distance2 > far * far:
-        return
-    hx = np.float64(entries.heading[e, 0])
-    hy = np.float64(entries.heading[e, 1])
-    hz = np.float64(entries.heading[e, 2])
-    # The sphere lies wholly outside when it is further from the cone's mantle than its radius.
-    along = dx * hx + dy * hy + dz * hz
-    across = np.sqrt(max(distance2 - along * along, 0.0))
-    cosine = sites.cosine[s]
-    if across * cosine - along * sites.sine[s] > sphere[3] + 1e-5 * far:
-        return
-    for m in range(n):
-        dx = free.point[0, m] - bx
-        dy = free.point[1, m] - by
-        dz = free.point[2, m] - bz
-        distance2 = dx * dx + dy * dy + dz * dz
-        if distance2 > free.best[m] or distance2 > reach * reach:
-            continue
-        if not dx * hx + dy * hy + dz * hz >= cosine * np.sqrt(distance2):
-            continue
-        old = free.winner[m]
-        if (
-            old >= 0
-            and distance2 == free.best[m]
-            and not _precedes(buds, entries.bud[e], entries.bud[old])
-        ):
-            continue
-        free.best[m] = distance2
-        free.winner[m] = e
+    if tree_row[a] != tree_row[b]:
+        return tree_row[a] < tree_row[b]
+    if serial[a] != serial[b]:
+        return serial[a] < serial[b]
+    return kind[a] < kind[b]
 
 
 @njit
@@ -184,14 +165,51 @@ def _compete_in_tile(
     n: Any,
 ) -> None:
     """Give each free marker of a tile to the nearest bud whose cone holds it."""
+    point, best, winner = free.point, free.best, free.winner
+    at, heading, bud = entries.point, entries.heading, entries.bud
+    low_x, low_y, low_z, high_x, high_y, high_z = _bounds(point, n)
+    dx, dy, dz = high_x - low_x, high_y - low_y, high_z - low_z
+    radius = 0.5 * np.sqrt(dx * dx + dy * dy + dz * dz)
+    mid_x, mid_y, mid_z = low_x + 0.5 * dx, low_y + 0.5 * dy, low_z + 0.5 * dz
     for m in range(n):
-        free.best[m] = np.inf
-        free.winner[m] = -1
-    sphere = _bounding_sphere(free, n)
+        best[m] = np.inf
+        winner[m] = -1
     for r in range(len(rows.offset)):
         start, end = row_bounds(lattice, entries.first, rows, r, x, y, z)
         for e in range(start, end):
-            _offer(entries, sites, buds, e, sphere, free, n)
+            s = entries.species[e]
+            reach = sites.perception[s]
+            cosine = sites.cosine[s]
+            bx, by, bz = at[e, 0], at[e, 1], at[e, 2]
+            dx, dy, dz = mid_x - bx, mid_y - by, mid_z - bz
+            distance2 = dx * dx + dy * dy + dz * dz
+            far = (reach + radius) * 1.00001
+            if distance2 > far * far:
+                continue
+            hx = np.float64(heading[e, 0])
+            hy = np.float64(heading[e, 1])
+            hz = np.float64(heading[e, 2])
+            # All markers lie in a sphere: it is outside the cone when it is further from the
+            # cone's mantle than its radius.
+            along = dx * hx + dy * hy + dz * hz
+            across = np.sqrt(max(distance2 - along * along, 0.0))
+            if across * cosine - along * sites.sine[s] > radius + 1e-5 * far:
+                continue
+            for m in range(n):
+                dx = point[0, m] - bx
+                dy = point[1, m] - by
+                dz = point[2, m] - bz
+                distance2 = dx * dx + dy * dy + dz * dz
+                if distance2 > best[m] or distance2 > reach * reach:
+                    continue
+                if not dx * hx + dy * hy + dz * hz >= cosine * np.sqrt(distance2):
+                    continue
+                if distance2 == best[m] and not _precedes(
+                    buds.tree_row, buds.serial, buds.kind, bud[e], bud[winner[m]]
+                ):
+                    continue
+                best[m] = distance2
+                winner[m] = e
 
 
 @njit_parallel

@@ -46,7 +46,7 @@ _LATERAL = 4
 def income_rate(traits, sp, vigour, year):  # type: ignore[no-untyped-def]
     """Income of one site of a species in full light at the ground, kg a year."""
     return (
-        traits.light_use[sp] * traits.leaf_area[sp] * vigour * year.income_factor / year.full_light
+        traits.of[sp].light_use * traits.of[sp].leaf_area * vigour * year.income_factor / year.full_light
     )
 
 
@@ -54,13 +54,13 @@ def income_rate(traits, sp, vigour, year):  # type: ignore[no-untyped-def]
 def unit_costs(traits, sp):  # type: ignore[no-untyped-def]
     """Cost (kg) and length (m) of one new metamer by order: primary wood and first leaves."""
     units = np.empty((MAX_ORDERS, 2))
-    wood = traits.density[sp] * 0.25 * np.pi * traits.twig_diameter[sp] ** 2
+    wood = traits.of[sp].density * 0.25 * np.pi * traits.of[sp].twig_diameter ** 2
     for o in range(MAX_ORDERS):
         factor = curve(
             traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, np.float64(o)
         )
-        units[o, 1] = traits.internode_length[sp] * factor
-        units[o, 0] = wood * units[o, 1] + traits.leaf_mass[sp]
+        units[o, 1] = traits.of[sp].internode_length * factor
+        units[o, 0] = wood * units[o, 1] + traits.of[sp].leaf_mass
     return units
 
 
@@ -73,11 +73,11 @@ def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-unty
     weights = work[6:8]
     if year.balance:
         traits = (
-            t.density[sp],
-            t.min_growth[sp],
-            t.offset_gain[sp],
-            t.light_gain[sp],
-            t.offset_length[sp],
+            t.of[sp].density,
+            t.of[sp].min_growth,
+            t.of[sp].offset_gain,
+            t.of[sp].light_gain,
+            t.of[sp].offset_length,
         )
         growth_shares(
             parent, state, tip, length, pipe, light, traits, weights, work[8:11], ints[0:2]
@@ -98,8 +98,8 @@ def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-unty
             q_side,
             weights,
             control,
-            (t.w_max[sp], t.w_min[sp], t.kappa[sp]),
-            t.max_order[sp],
+            (t.of[sp].w_max, t.of[sp].w_min, t.of[sp].kappa),
+            t.of[sp].max_order,
             v_base,
             v_main,
             v_side,
@@ -107,7 +107,7 @@ def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-unty
         )
     else:
         for o in range(MAX_ORDERS):
-            control[o] = t.apical_bias[sp] if age < t.apical_until[sp, o] else 0.5
+            control[o] = t.of[sp].apical_bias if age < t.apical_until[sp, o] else 0.5
         share_borchert_honda(
             parent,
             state,
@@ -116,7 +116,7 @@ def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-unty
             q_side,
             weights,
             control,
-            t.max_order[sp],
+            t.of[sp].max_order,
             v_base,
             v_main,
             v_side,
@@ -177,7 +177,7 @@ def _allocate_paper(arena, trees, row, t, year, work, ints):  # type: ignore[no-
     )
     q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
     age = np.float64(year.step - trees.birth[row])
-    _share(t, sp, age, year, parts, t.alpha[sp] * q_base, work, ints)
+    _share(t, sp, age, year, parts, t.of[sp].alpha * q_base, work, ints)
     for i in range(n):
         arena.resource[s + i, 0] = work[2, i] if arena.state[s + i] & _TERMINAL else 0.0
         arena.resource[s + i, 1] = work[3, i] if arena.state[s + i] & _LATERAL else 0.0
@@ -194,10 +194,10 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
     income = 0.0
     leaves = 0.0
     upkeep = 0.0
-    leaf = t.leaf_mass[sp] / t.leaf_lifespan[sp]
-    to_volume = 0.25 * np.pi * t.density[sp]
-    minimal = to_volume * t.first_pipe[sp] ** 2
-    retention = t.leaf_retention[sp]
+    leaf = t.of[sp].leaf_mass / t.of[sp].leaf_lifespan
+    to_volume = 0.25 * np.pi * t.of[sp].density
+    minimal = to_volume * t.of[sp].first_pipe ** 2
+    retention = t.of[sp].leaf_retention
     for k in range(n):
         i = s + k
         upkeep += np.float64(arena.sapwood[i]) * np.float64(arena.length[i])
@@ -205,24 +205,24 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
         sites = (1 if state & _TERMINAL else 0) + (1 if state & _LATERAL else 0)
         if sites == 0:
             continue
-        earned = site_income(np.float64(arena.light[i]), path[k], rate, t.hydraulic_length[sp])
+        earned = site_income(np.float64(arena.light[i]), path[k], rate, t.of[sp].hydraulic_length)
         income += sites * earned
         leaves += sites * leaf
         if earned < leaf + minimal * pipe_path[k]:
             arena.deficit[i] = np.uint8(min(255, np.int64(arena.deficit[i]) + 1))
-            if arena.deficit[i] > t.deficit_years[sp]:
+            if arena.deficit[i] > t.of[sp].deficit_years:
                 draw, other, _, _ = random.uniforms(
                     year.seed, STREAM_ABORT, tree_id, arena.serial[i], year.step
                 )
-                if state & _TERMINAL and draw < t.abortion[sp]:
+                if state & _TERMINAL and draw < t.of[sp].abortion:
                     arena.state[i] &= np.uint8(255 - _TERMINAL)
-                if state & _LATERAL and other < t.abortion[sp]:
+                if state & _LATERAL and other < t.of[sp].abortion:
                     arena.state[i] &= np.uint8(255 - _LATERAL)
         else:
             arena.deficit[i] = 0
         if retention > 0.0 and year.step - arena.birth[i] >= retention:
             arena.state[i] &= np.uint8(255 - _LATERAL)
-    return income, leaves, t.maintenance[sp] * to_volume * upkeep
+    return income, leaves, t.of[sp].maintenance * to_volume * upkeep
 
 
 @njit
@@ -242,32 +242,32 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, work, ints):  # typ
         arena.light[s:e],
     )
     path, pipe_path = work[4], work[5]
-    path_lengths(parts[0], parts[2], parts[4], t.branch_pipe[sp], path, pipe_path)
+    path_lengths(parts[0], parts[2], parts[4], t.of[sp].branch_pipe, path, pipe_path)
     rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
     income, leaves, upkeep = _keep_sites(
         arena, s, n, t, sp, year, trees.tree_id[row], rate, path, pipe_path
     )
     have = trees.reserve[row] + income - leaves - upkeep
-    spend = (1.0 - t.reserve_fraction[sp]) * max(have, 0.0)
+    spend = (1.0 - t.of[sp].reserve_fraction) * max(have, 0.0)
     accounts[row, INCOME] = income
     accounts[row, LEAVES] = leaves
     accounts[row, UPKEEP] = upkeep
     accounts[row, SPEND] = spend
     accounts[row, RESERVE_CHANGE] = have - spend - trees.reserve[row]
     trees.reserve[row] = have - spend
-    poor = income - leaves - upkeep < t.suppression_ratio[sp] * income or income <= 0.0
+    poor = income - leaves - upkeep < t.of[sp].suppression_ratio * income or income <= 0.0
     trees.bad_years[row] = trees.bad_years[row] + 1 if poor else 0
 
     q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
     age = np.float64(year.step - trees.birth[row])
-    _share(t, sp, age, year, parts, t.alpha[sp] * q_base / year.full_light, work, ints)
+    _share(t, sp, age, year, parts, t.of[sp].alpha * q_base / year.full_light, work, ints)
     for i in range(n):
         if not arena.state[s + i] & _TERMINAL:
             work[2, i] = 0.0
         if not arena.state[s + i] & _LATERAL:
             work[3, i] = 0.0
     resource = arena.resource[s:e]
-    pipe_cost = 0.25 * np.pi * t.density[sp] * t.first_pipe[sp] ** 2
+    pipe_cost = 0.25 * np.pi * t.of[sp].density * t.of[sp].first_pipe ** 2
     scale = affordable_scale(
         resource,
         work[2],
@@ -276,9 +276,9 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, work, ints):  # typ
         parts[2],
         unit_costs(t, sp),
         pipe_cost,
-        t.branch_pipe[sp],
-        int(t.max_metamers[sp]),
-        (1.0 - t.ring_fraction[sp]) * spend,
+        t.of[sp].branch_pipe,
+        int(t.of[sp].max_metamers),
+        (1.0 - t.of[sp].ring_fraction) * spend,
     )
     for i in range(n):
         resource[i, 0] += np.float32(scale * work[2, i])

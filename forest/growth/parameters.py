@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,54 +30,73 @@ _CURVES = (
 )
 
 
-class SpeciesTraits(NamedTuple):
-    """Species parameters as kernels read them: float64, one entry per species.
+#: Numbers of a species that kernels read, in one record: float64, names and units as in the
+#: species files, angles in radians.
+TRAITS = (
+    "internode_length",
+    "branching_angle",
+    "divergence_angle",
+    "angle_jitter",
+    "max_metamers",
+    "max_order",
+    "sylleptic",
+    "sympodial",
+    "alpha",
+    "apical_bias",
+    "w_max",
+    "w_min",
+    "kappa",
+    "light_weight",
+    "tropism_weight",
+    "tropism_x",
+    "tropism_y",
+    "tropism_z",
+    "shed_below",
+    "pipe_exponent",
+    "twig_diameter",
+    "density",
+    "leaf_area",
+    "leaf_mass",
+    "leaf_lifespan",
+    "leaf_retention",
+    "light_use",
+    "maintenance",
+    "sapwood_years",
+    "reserve_fraction",
+    "ring_fraction",
+    "branch_pipe",
+    "hydraulic_length",
+    "first_pipe",
+    "suppression_ratio",
+    "suppression_years",
+    "deficit_years",
+    "abortion",
+    "min_growth",
+    "offset_gain",
+    "light_gain",
+    "offset_length",
+)
 
-    Names and units are those of the species files; angles are in radians.
+
+class SpeciesTraits(NamedTuple):
+    """Species parameters as kernels read them.
+
+    One array of records keeps the kernels' signatures small: forty arrays as arguments made
+    them take three times as long to compile.
+
+    Attributes
+    ----------
+    of : record array (species,)
+        Fields `TRAITS`.
+    apical_until : float64 (species, MAX_ORDERS)
+        Age until which axes of an order are under apical control, years.
+    curve_n : int64 (species, curves)
+        Points of each user-drawn curve; 0 where there is none.
+    curve_x, curve_y : float64 (species, curves, points)
+        The points.
     """
 
-    internode_length: NDArray[np.float64]
-    branching_angle: NDArray[np.float64]
-    divergence_angle: NDArray[np.float64]
-    angle_jitter: NDArray[np.float64]
-    max_metamers: NDArray[np.float64]
-    max_order: NDArray[np.float64]
-    sylleptic: NDArray[np.float64]
-    sympodial: NDArray[np.float64]
-    alpha: NDArray[np.float64]
-    apical_bias: NDArray[np.float64]
-    w_max: NDArray[np.float64]
-    w_min: NDArray[np.float64]
-    kappa: NDArray[np.float64]
-    light_weight: NDArray[np.float64]
-    tropism_weight: NDArray[np.float64]
-    tropism_x: NDArray[np.float64]
-    tropism_y: NDArray[np.float64]
-    tropism_z: NDArray[np.float64]
-    shed_below: NDArray[np.float64]
-    pipe_exponent: NDArray[np.float64]
-    twig_diameter: NDArray[np.float64]
-    density: NDArray[np.float64]
-    leaf_area: NDArray[np.float64]
-    leaf_mass: NDArray[np.float64]
-    leaf_lifespan: NDArray[np.float64]
-    leaf_retention: NDArray[np.float64]
-    light_use: NDArray[np.float64]
-    maintenance: NDArray[np.float64]
-    sapwood_years: NDArray[np.float64]
-    reserve_fraction: NDArray[np.float64]
-    ring_fraction: NDArray[np.float64]
-    branch_pipe: NDArray[np.float64]
-    hydraulic_length: NDArray[np.float64]
-    first_pipe: NDArray[np.float64]
-    suppression_ratio: NDArray[np.float64]
-    suppression_years: NDArray[np.float64]
-    deficit_years: NDArray[np.float64]
-    abortion: NDArray[np.float64]
-    min_growth: NDArray[np.float64]
-    offset_gain: NDArray[np.float64]
-    light_gain: NDArray[np.float64]
-    offset_length: NDArray[np.float64]
+    of: NDArray[Any]
     apical_until: NDArray[np.float64]
     curve_n: NDArray[np.int64]
     curve_x: NDArray[np.float64]
@@ -129,7 +148,7 @@ def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
                 curve_x[row, k, j] = x
                 curve_y[row, k, j] = y
     hydraulic = each("carbon", "hydraulic_length_m")
-    return SpeciesTraits(
+    values = dict(
         internode_length=each("architecture", "internode_length_m"),
         branching_angle=each("architecture", "branching_angle_deg", degree),
         divergence_angle=each("architecture", "divergence_angle_deg", degree),
@@ -172,8 +191,8 @@ def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
         offset_gain=each("balance", "offset_gain"),
         light_gain=each("balance", "light_gain"),
         offset_length=each("balance", "offset_length_factor"),
-        apical_until=apical,
-        curve_n=curve_n,
-        curve_x=curve_x,
-        curve_y=curve_y,
     )
+    of = np.zeros(len(species), [(name, np.float64) for name in TRAITS])
+    for name in TRAITS:
+        of[name] = values[name]
+    return SpeciesTraits(of, apical, curve_n, curve_x, curve_y)

@@ -120,12 +120,12 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
     state = arena.state[s:e]
     birth = arena.birth[s:e]
     path, pipe_path, flow, surplus = work[0], work[1], work[2], work[3]
-    path_lengths(parent, order, length, t.branch_pipe[sp], path, pipe_path)
-    volume = 0.25 * np.pi * t.density[sp]
-    strand = t.first_pipe[sp] ** 2
-    primary = t.twig_diameter[sp] ** 2
+    path_lengths(parent, order, length, t.of[sp].branch_pipe, path, pipe_path)
+    volume = 0.25 * np.pi * t.of[sp].density
+    strand = t.of[sp].first_pipe ** 2
+    primary = t.of[sp].twig_diameter ** 2
     rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
-    leaf = t.leaf_mass[sp] / t.leaf_lifespan[sp]
+    leaf = t.of[sp].leaf_mass / t.of[sp].leaf_lifespan
     extension = 0.0
     total = 0.0
     for i in range(n):
@@ -136,7 +136,7 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
             arena.sapwood[s + i] = primary
             flow[i] = strand
             extension += volume * (primary * np.float64(length[i]) + strand * pipe_path[i])
-            extension += t.leaf_mass[sp]
+            extension += t.of[sp].leaf_mass
             if i > 0 and birth[parent[i]] != year.step:
                 surplus[parent[i]] += 1.0  # a bud that shot was a site when the year began
         else:
@@ -144,12 +144,12 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
     for i in range(n):
         if surplus[i] > 0.0:
             light = np.float64(arena.light[s + i])
-            earned = site_income(light, path[i], rate, t.hydraulic_length[sp])
+            earned = site_income(light, path[i], rate, t.of[sp].hydraulic_length)
             surplus[i] *= max(earned - leaf, 0.0)
             total += surplus[i]
     rest = max(accounts[row, SPEND] - extension, 0.0)
     support = reinforce(
-        parent, length, pipe, t.density[sp], t.leaf_mass[sp], state, rest, work[4], work[5]
+        parent, length, pipe, t.of[sp].density, t.of[sp].leaf_mass, state, rest, work[4], work[5]
     )
     ring = rest - support
     if total > 0.0:
@@ -171,8 +171,8 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
         order,
         pipe,
         arena.sapwood[s:e],
-        t.branch_pipe[sp],
-        1.0 - 1.0 / t.sapwood_years[sp],
+        t.of[sp].branch_pipe,
+        1.0 - 1.0 / t.of[sp].sapwood_years,
         flow,
     )
 
@@ -202,7 +202,7 @@ def thicken(
                     arena.birth[s : s + n],
                     year.step,
                     arena.pipe[s : s + n],
-                    traits.twig_diameter[sp] ** traits.pipe_exponent[sp],
+                    traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent,
                     work[0],
                 )
             else:

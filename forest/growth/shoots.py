@@ -71,7 +71,7 @@ def _count(arena: Metamers, trees: Trees, shared: Deal, traits: SpeciesTraits, s
     for b in prange(BINS):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
-            most = np.int64(traits.max_metamers[trees.species[row]])
+            most = np.int64(traits.of[trees.species[row]].max_metamers)
             buds = 0
             metamers = 0
             for i in range(trees.start[row], trees.start[row] + trees.size[row]):
@@ -223,13 +223,13 @@ def _add(arena, trees, row, at, p, main, hx, hy, hz, length, order, t, year, hei
         px, py, pz = perpendicular(
             hx, hy, hz, arena.bud[s + p, 0], arena.bud[s + p, 1], arena.bud[s + p, 2]
         )
-        turn = t.divergence_angle[sp] + (2.0 * a - 1.0) * t.angle_jitter[sp]
+        turn = t.of[sp].divergence_angle + (2.0 * a - 1.0) * t.of[sp].angle_jitter
     else:
         px, py, pz = perpendicular(hx, hy, hz, 1.0, 0.0, 0.0)
         u, _, _, _ = random.uniforms(year.seed, STREAM_PHYLLOTAXIS, trees.tree_id[row], serial, 0)
         turn = 2.0 * np.pi * u
     px, py, pz = turned(hx, hy, hz, px, py, pz, turn)
-    angle = t.branching_angle[sp] + (2.0 * b - 1.0) * t.angle_jitter[sp]
+    angle = t.of[sp].branching_angle + (2.0 * b - 1.0) * t.of[sp].angle_jitter
     c = np.cos(angle)
     d = np.sin(angle)
     arena.bud[i, 0] = c * hx + d * px
@@ -253,10 +253,10 @@ def _add(arena, trees, row, at, p, main, hx, hy, hz, length, order, t, year, hei
 @njit
 def _steered(t, sp, eta, hx, hy, hz, vx, vy, vz):  # type: ignore[no-untyped-def]
     """Default direction + xi V + eta tropism, normalized (4.3)."""
-    xi = t.light_weight[sp]
-    x = hx + xi * vx + eta * t.tropism_x[sp]
-    y = hy + xi * vy + eta * t.tropism_y[sp]
-    z = hz + xi * vz + eta * t.tropism_z[sp]
+    xi = t.of[sp].light_weight
+    x = hx + xi * vx + eta * t.of[sp].tropism_x
+    y = hy + xi * vy + eta * t.of[sp].tropism_y
+    z = hz + xi * vz + eta * t.of[sp].tropism_z
     norm = np.sqrt(x * x + y * y + z * z)
     if norm < 1e-9:
         return hx, hy, hz
@@ -279,11 +279,11 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
     sp = trees.species[row]
     end = trees.size[row]
     age = np.float64(year.step - trees.birth[row])
-    by_age = t.tropism_weight[sp] * curve(
+    by_age = t.of[sp].tropism_weight * curve(
         t.curve_n, t.curve_x, t.curve_y, sp, TROPISM_BY_AGE, age
     )
-    most = np.int64(t.max_metamers[sp])
-    bias = t.apical_bias[sp] if age < t.apical_until[sp, 0] else 0.5
+    most = np.int64(t.of[sp].max_metamers)
+    bias = t.of[sp].apical_bias if age < t.apical_until[sp, 0] else 0.5
     # a sylleptic shoot branches as it grows: (parent, bud, resource) still to be grown
     wait_p = np.empty(_STACK, np.int64)
     wait_bud = np.empty(_STACK, np.int64)
@@ -299,7 +299,7 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
             np.float64(toward[j, 1]),
             np.float64(toward[j, 2]),
         )
-        if t.sylleptic[sp] > 0.0:
+        if t.of[sp].sylleptic > 0.0:
             wait_p[0], wait_bud[0], wait_v[0] = p, bud, min(v, most + 0.999)
             waiting = 1
         else:
@@ -312,10 +312,10 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
             eta = by_age * curve(
                 t.curve_n, t.curve_x, t.curve_y, sp, TROPISM_BY_ORDER, np.float64(order)
             )
-            unit = t.internode_length[sp] * curve(
+            unit = t.of[sp].internode_length * curve(
                 t.curve_n, t.curve_x, t.curve_y, sp, LENGTH_BY_ORDER, np.float64(order)
             )
-            if year.paper and t.sylleptic[sp] == 0.0:
+            if year.paper and t.of[sp].sylleptic == 0.0:
                 unit *= min(v / n, 2.0)  # l = v / n (4.2)
             hx, hy, hz = bud_heading(arena, s, p, bud)
             made = 0
@@ -337,14 +337,14 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
                 p = np.int64(end)
                 end += 1
                 left -= 1.0
-                if t.sylleptic[sp] > 0.0:
+                if t.of[sp].sylleptic > 0.0:
                     # all buds are equivalent: what is left goes on to both buds of the node
                     side = (1.0 - bias) * left
                     left = bias * left
-                    if side >= 1.0 and waiting < _STACK and order < t.max_order[sp]:
+                    if side >= 1.0 and waiting < _STACK and order < t.of[sp].max_order:
                         wait_p[waiting], wait_bud[waiting], wait_v[waiting] = p, LATERAL_BUD, side
                         waiting += 1
-            if made > 0 and t.sympodial[sp] == 0.0:
+            if made > 0 and t.of[sp].sympodial == 0.0:
                 arena.state[s + p] |= np.uint8(_TERMINAL)
     trees.size[row] = end
 
@@ -383,13 +383,13 @@ def sprout(arena: Metamers, trees: Trees, first_row, traits: SpeciesTraits, year
     for row in range(first_row, len(trees.tree_id)):
         sp = trees.species[row]
         s = trees.start[row]
-        unit = traits.internode_length[sp] * curve(
+        unit = traits.of[sp].internode_length * curve(
             traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, 0.0
         )
         _add(
             arena, trees, row, 0, -1, True, 0.0, 0.0, 1.0, unit, 0, traits, year, np.uint8(255)
         )
         arena.state[s] = _TERMINAL | _LATERAL
-        arena.pipe[s] = traits.twig_diameter[sp] ** traits.pipe_exponent[sp]
+        arena.pipe[s] = traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent
         arena.sapwood[s] = arena.pipe[s]
         trees.size[row] = 1
