@@ -113,7 +113,7 @@ def _internode_direction(tip: Any, k: Any, parent: Any) -> Any:
 
 @njit
 def _fill_tree(metamers: Any, trees: Any, t: Any, first: Any, end: Any, b: Any, buds: Any) -> Any:
-    """List the buds of metamers `first` to `end` of tree row `t` from entry `b` on; give its end."""
+    """List the buds of metamers `first` to `end` of a tree from entry `b` on; give the end."""
     tip, position, heading = metamers.tip, buds.position, buds.heading
     start = trees.start[t]
     for k in range(start + first, start + end):
