@@ -30,8 +30,7 @@ $(READY): pyproject.toml
 demo: $(READY)  ## grow the Saxony spruce stand for 60 years, print its table, draw it
 	@mkdir -p out
 	@$(BIN)/forest run scenarios/saxony_spruce.toml --out out/run.h5 --force
-	@$(BIN)/forest table out/run.h5
-	@$(BIN)/forest draw out/run.h5 --stand out/stand.png --development out/development.png
+	@$(BIN)/forest picture out/run.h5 --to out/stand.png --development out/development.png --force
 
 # One process compiles the kernels of an ordinary run before two use them; each test worker then
 # takes a copy of that cache (tests/conftest.py).
