@@ -79,21 +79,30 @@ def _tree_of(first_site: Any, site: Any) -> Any:
     return np.searchsorted(first_site, site, side="right") - 1
 
 
+# Fields of tuples are written in serial functions only: inside a prange numba takes
+# `buds.kind[b] = kind` for dead code and drops it.
+
+
+@njit
+def _count_in(state: Any, start: Any, end: Any) -> Any:
+    """Count the living buds of the arena's metamers `start` to `end`."""
+    buds = 0
+    for k in range(start, end):
+        buds += (state[k] & _TERMINAL != 0) + (state[k] & _LATERAL != 0)
+    return buds
+
+
 @njit_parallel
 def _count_buds(metamers: Any, trees: Any, first_site: Any) -> Any:
     count = np.zeros(CHUNKS, np.int64)
     for c in prange(CHUNKS):
         site, end = chunk_bounds(first_site[-1], c)
-        buds = 0
         while site < end:
             t = _tree_of(first_site, site)
             shift = trees.start[t] - first_site[t]
             stop = min(end, first_site[t + 1])
-            for k in range(site + shift, stop + shift):
-                state = metamers.state[k]
-                buds += (state & _TERMINAL != 0) + (state & _LATERAL != 0)
+            count[c] += _count_in(metamers.state, site + shift, stop + shift)
             site = stop
-        count[c] = buds
     return count
 
 
@@ -197,6 +206,22 @@ def bud_index(space: Any, tree_row: Any, metamer: Any, kind: Any) -> Any:
     return np.int64(-1)
 
 
+@njit
+def _mark_tree(states: Any, found: Any, b: Any) -> None:
+    """Set the bits of consecutive metamers of a tree, whose first bud is entry `b`."""
+    for k in range(len(states)):
+        state = np.int64(states[k]) & _KEEP
+        if state & _TERMINAL:
+            if found[b] == 0:
+                state |= _NO_ROOM_TERMINAL
+            b += 1
+        if state & _LATERAL:
+            if found[b] == 0:
+                state |= _NO_ROOM_LATERAL
+            b += 1
+        states[k] = state
+
+
 @njit_parallel
 def _mark_room(metamers: Any, trees: Any, first_site: Any, space: Any) -> None:
     for c in prange(CHUNKS):
@@ -204,20 +229,11 @@ def _mark_room(metamers: Any, trees: Any, first_site: Any, space: Any) -> None:
         while site < end:
             t = _tree_of(first_site, site)
             stop = min(end, first_site[t + 1])
-            own = space.metamer[space.first_of_tree[t] : space.first_of_tree[t + 1]]
-            b = space.first_of_tree[t] + np.searchsorted(own, site - first_site[t])
+            first = space.first_of_tree[t]
+            own = space.metamer[first : space.first_of_tree[t + 1]]
+            b = first + np.searchsorted(own, site - first_site[t])
             shift = trees.start[t] - first_site[t]
-            for k in range(site + shift, stop + shift):
-                state = metamers.state[k] & _KEEP
-                if state & _TERMINAL:
-                    if space.found[b] == 0:
-                        state |= _NO_ROOM_TERMINAL
-                    b += 1
-                if state & _LATERAL:
-                    if space.found[b] == 0:
-                        state |= _NO_ROOM_LATERAL
-                    b += 1
-                metamers.state[k] = state
+            _mark_tree(metamers.state[site + shift : stop + shift], space.found, b)
             site = stop
 
 

@@ -212,6 +212,60 @@ def _compete_in_tile(
                 winner[m] = e
 
 
+@njit
+def _update_gone(free: Any, n: Any, bits: Any, cloud_gone: Any, value: Any) -> Any:
+    """Set the first `n` listed markers of a tile to gone (`value` 1) or back (0)."""
+    for m in range(n):
+        if free.code[m] >= CELLS:
+            cloud_gone[free.code[m] - CELLS] = value
+        elif value:
+            bits |= np.uint64(1) << np.uint64(free.code[m])
+        else:
+            bits &= ~(np.uint64(1) << np.uint64(free.code[m]))
+    return bits
+
+
+@njit
+def _work_on_tile(
+    lattice: Any,
+    entries: Any,
+    rows_near: Any,
+    rows_far: Any,
+    sites: Any,
+    buds: Any,
+    envelopes: Any,
+    cloud: Any,
+    gone: Any,
+    release: Any,
+    tile: Any,
+    free: Any,
+    winner: Any,
+    cloud_winner: Any,
+) -> None:
+    """Take and share out the markers of one tile."""
+    nx, ny, _ = lattice.shape
+    x, y, z = tile % nx, tile // nx % ny, tile // (nx * ny)
+    gone_z, gone_y, gone_x = z + gone.at[0], y + gone.at[1], x + gone.at[2]
+    winner[:] = -1
+    bits = np.uint64(0) if release else gone.bits[gone_z, gone_y, gone_x]
+    n = _gather(lattice, envelopes, cloud, bits, x, y, z, free)
+    if n == 0:
+        return
+    if not release:
+        bits = _update_gone(free, n, bits, cloud.gone, 1)
+    n = _clear_occupied(lattice, entries, rows_near, sites, x, y, z, free, n)
+    if not release:
+        gone.bits[gone_z, gone_y, gone_x] = _update_gone(free, n, bits, cloud.gone, 0)
+    if n == 0:
+        return
+    _compete_in_tile(lattice, entries, rows_far, sites, buds, x, y, z, free, n)
+    for m in range(n):
+        if free.code[m] < CELLS:
+            winner[free.code[m]] = free.winner[m]
+        else:
+            cloud_winner[free.code[m] - CELLS] = free.winner[m]
+
+
 @njit_parallel
 def compete(
     lattice: Any,
@@ -245,7 +299,6 @@ def compete(
     winner, cloud_winner : int32 (n, 64), int32 (n_cloud,)
         Entry that each marker belongs to; -1 for none.
     """
-    nx, ny, _ = lattice.shape
     winner = np.empty((len(tiles), CELLS), np.int32)
     cloud_winner = np.full(len(cloud.point), -1, np.int32)
     blocks = (len(tiles) + _BLOCK - 1) // _BLOCK
@@ -258,37 +311,22 @@ def compete(
         )
         for block in range(c, blocks, CHUNKS):
             for t in range(block * _BLOCK, min((block + 1) * _BLOCK, len(tiles))):
-                winner[t, :] = -1
-                x = tiles[t] % nx
-                y = tiles[t] // nx % ny
-                z = tiles[t] // (nx * ny)
-                bits = np.uint64(0)
-                if not release:
-                    bits = gone.bits[z + gone.at[0], y + gone.at[1], x + gone.at[2]]
-                n = _gather(lattice, envelopes, cloud, bits, x, y, z, free)
-                here = np.uint64(0)
-                if not release:
-                    for m in range(n):
-                        if free.code[m] < CELLS:
-                            here |= np.uint64(1) << np.uint64(free.code[m])
-                        else:
-                            cloud.gone[free.code[m] - CELLS] = 1
-                n = _clear_occupied(lattice, entries, rows_near, sites, x, y, z, free, n)
-                if not release:
-                    for m in range(n):
-                        if free.code[m] < CELLS:
-                            here &= ~(np.uint64(1) << np.uint64(free.code[m]))
-                        else:
-                            cloud.gone[free.code[m] - CELLS] = 0
-                    gone.bits[z + gone.at[0], y + gone.at[1], x + gone.at[2]] = bits | here
-                if n == 0:
-                    continue
-                _compete_in_tile(lattice, entries, rows_far, sites, buds, x, y, z, free, n)
-                for m in range(n):
-                    if free.code[m] < CELLS:
-                        winner[t, free.code[m]] = free.winner[m]
-                    else:
-                        cloud_winner[free.code[m] - CELLS] = free.winner[m]
+                _work_on_tile(
+                    lattice,
+                    entries,
+                    rows_near,
+                    rows_far,
+                    sites,
+                    buds,
+                    envelopes,
+                    cloud,
+                    gone,
+                    release,
+                    tiles[t],
+                    free,
+                    winner[t],
+                    cloud_winner,
+                )
     return winner, cloud_winner
 
 
