@@ -28,7 +28,7 @@ class Scratch(NamedTuple):
     point: NDArray[np.float64]
     code: NDArray[np.int64]
     best: NDArray[np.float64]
-    winner: NDArray[np.int32]
+    winner: NDArray[np.int64]
 
 
 @njit
@@ -166,6 +166,7 @@ def _compete_in_tile(
 ) -> None:
     """Give each free marker of a tile to the nearest bud whose cone holds it."""
     point, best, winner = free.point, free.best, free.winner
+    px, py, pz = point[0], point[1], point[2]
     at, heading, bud = entries.point, entries.heading, entries.bud
     low_x, low_y, low_z, high_x, high_y, high_z = _bounds(point, n)
     dx, dy, dz = high_x - low_x, high_y - low_y, high_z - low_z
@@ -181,35 +182,48 @@ def _compete_in_tile(
             reach = sites.perception[s]
             cosine = sites.cosine[s]
             bx, by, bz = at[e, 0], at[e, 1], at[e, 2]
-            dx, dy, dz = mid_x - bx, mid_y - by, mid_z - bz
-            distance2 = dx * dx + dy * dy + dz * dz
-            far = (reach + radius) * 1.00001
-            if distance2 > far * far:
+            dx = max(low_x - bx, bx - high_x, 0.0)
+            dy = max(low_y - by, by - high_y, 0.0)
+            dz = max(low_z - bz, bz - high_z, 0.0)
+            if dx * dx + dy * dy + dz * dz > reach * reach:
                 continue
+            dx, dy, dz = mid_x - bx, mid_y - by, mid_z - bz
             hx = np.float64(heading[e, 0])
             hy = np.float64(heading[e, 1])
             hz = np.float64(heading[e, 2])
             # All markers lie in a sphere: it is outside the cone when it is further from the
             # cone's mantle than its radius.
             along = dx * hx + dy * hy + dz * hz
-            across = np.sqrt(max(distance2 - along * along, 0.0))
-            if across * cosine - along * sites.sine[s] > radius + 1e-5 * far:
+            across = np.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
+            if across * cosine - along * sites.sine[s] > radius + 1e-5 * (reach + radius):
+                continue
+            ties = 0
+            for m in range(n):  # without branches, so that it vectorises
+                dx = px[m] - bx
+                dy = py[m] - by
+                dz = pz[m] - bz
+                distance2 = dx * dx + dy * dy + dz * dz
+                seen = (distance2 <= reach * reach) & (
+                    dx * hx + dy * hy + dz * hz >= cosine * np.sqrt(distance2)
+                )
+                ties += seen & (distance2 == best[m])
+                nearer = seen & (distance2 < best[m])
+                best[m] = distance2 if nearer else best[m]
+                winner[m] = e if nearer else winner[m]
+            if ties == 0:
                 continue
             for m in range(n):
-                dx = point[0, m] - bx
-                dy = point[1, m] - by
-                dz = point[2, m] - bz
+                dx = px[m] - bx
+                dy = py[m] - by
+                dz = pz[m] - bz
                 distance2 = dx * dx + dy * dy + dz * dz
-                if distance2 > best[m] or distance2 > reach * reach:
+                if distance2 != best[m] or winner[m] == e:
                     continue
-                if not dx * hx + dy * hy + dz * hz >= cosine * np.sqrt(distance2):
-                    continue
-                if distance2 == best[m] and not _precedes(
+                seen = dx * hx + dy * hy + dz * hz >= cosine * np.sqrt(distance2)
+                if seen and _precedes(
                     buds.tree_row, buds.serial, buds.kind, bud[e], bud[winner[m]]
                 ):
-                    continue
-                best[m] = distance2
-                winner[m] = e
+                    winner[m] = e
 
 
 @njit
@@ -307,7 +321,7 @@ def compete(
             np.empty((3, scratch_size)),
             np.empty(scratch_size, np.int64),
             np.empty(scratch_size),
-            np.empty(scratch_size, np.int32),
+            np.empty(scratch_size, np.int64),
         )
         for block in range(c, blocks, CHUNKS):
             for t in range(block * _BLOCK, min((block + 1) * _BLOCK, len(tiles))):

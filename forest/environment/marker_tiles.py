@@ -61,11 +61,10 @@ class Entries(NamedTuple):
 class Rows(NamedTuple):
     """Rows of bins around a tile that hold all buds within a distance, the nearest first.
 
-    `offset` is (dy, dz) of each row; a row runs from x - `half` to x + `half`.
+    `offset` is (dy, dz, half) of each row, which runs from x - half to x + half.
     """
 
     offset: NDArray[np.int64]
-    half: int
 
 
 class Sites(NamedTuple):
@@ -234,7 +233,8 @@ def row_bounds(lattice: Any, first: Any, rows: Any, r: Any, x: Any, y: Any, z: A
     ny = lattice.shape[1] + 2 * lattice.reach[1]
     row = (z + lattice.reach[2] + rows.offset[r, 1]) * ny
     row = (row + y + lattice.reach[1] + rows.offset[r, 0]) * nx + x + lattice.reach[0]
-    return first[row - rows.half], first[row + rows.half + 1]
+    half = rows.offset[r, 2]
+    return first[row - half], first[row + half + 1]
 
 
 @njit_parallel

@@ -304,6 +304,6 @@ def _rows(lattice: Lattice, distance: float) -> Rows:
         for dy in range(-half[1], half[1] + 1):
             gap = np.hypot(max(abs(dy) - 1, 0) * tile[1], max(abs(dz) - 1, 0) * tile[2])
             if gap <= distance:
-                offsets.append((float(gap), abs(dy) + abs(dz), dy, dz))
-    nearest = sorted(offsets)
-    return Rows(np.array([o[2:] for o in nearest], np.int64), int(half[0]))
+                half_x = int(np.sqrt(distance**2 - gap**2) / tile[0]) + 1
+                offsets.append((float(gap), abs(dy) + abs(dz), dy, dz, min(half_x, half[0])))
+    return Rows(np.array([o[2:] for o in sorted(offsets)], np.int64).reshape(-1, 3))
