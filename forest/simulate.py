@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
@@ -10,14 +9,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from forest._jit import is_cold
 from forest.errors import InputError
-from forest.record.checkpoint import latest_checkpoint, remove_checkpoints, write_checkpoint
+from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
-from forest.record.writer import RunWriter, check_run_file
+from forest.record.writer import RunWriter, check_target
+from forest.stand import Stand
 
 if TYPE_CHECKING:
     from forest.scenario import Scenario
-    from forest.stand import Stand
 
 
 class Observer(Protocol):
@@ -84,39 +84,42 @@ def simulate(
     """
     out = Path(out)
     observer = _observer(progress)
-    count = _thread_count(threads)
-    started = _resumed(scenario, out, count, command) if resume and out.exists() else None
-    if started is None and resume and out.exists():
-        check_run_file(out)
-        overwrite = True
-        observer.say(f"{out} has no checkpoint yet; starting over")
-    if started is not None and started[1] is None:
-        observer.say(f"{out} is complete; nothing to do")
-        return open_run(out)
-
-    import numba
-
-    from forest._jit import is_cold
-
-    numba.set_num_threads(count)
-    if started is None:
-        writer = _create(scenario, out, count, command, overwrite)
-        stand = None
+    if resume and out.exists():
+        if _is_complete(scenario, out):
+            observer.say(f"{out} is complete; nothing to do")
+            return open_run(out)
+        checkpoint = latest_checkpoint(out)
+        if checkpoint is None:
+            _check_nothing_is_lost(out)
+            observer.say(f"{out} has no checkpoint yet; starting over")
+            overwrite = True
     else:
-        stand, writer = started[0], started[1]
-    if is_cold():
-        observer.say("compiling the kernels for the first run on this machine (under a minute)")
-    try:
-        if stand is None:
-            from forest.stand import Stand
-
+        checkpoint = None
+        check_target(out, overwrite=overwrite)
+    with _threads(threads) as count:
+        if is_cold():
+            observer.say("compiling the kernels for the first run on this machine (about a minute)")
+        # The stand comes before the file: if it cannot be built, the file is left as it was.
+        if checkpoint is None:
             stand = Stand(scenario)
-        assert writer is not None
-        _grow(stand, writer, out, observer)
-    finally:
-        observer.end()
-        if writer is not None:
-            writer.close()
+            writer = _create(scenario, out, count, command, overwrite)
+        else:
+            arrays, meta = checkpoint
+            stand = Stand.restore(scenario, arrays, meta)
+            writer = RunWriter.reopen(
+                out,
+                rows=meta["rows"],
+                years_done=stand.steps,
+                scenario_toml=scenario.to_toml(),
+                digest=scenario.digest(),
+                threads=count,
+                command=command,
+            )
+        with writer:
+            try:
+                _grow(stand, writer, out, observer)
+            finally:
+                observer.end()
     return open_run(out)
 
 
@@ -124,7 +127,7 @@ def _grow(stand: Stand, writer: RunWriter, out: Path, observer: Observer) -> Non
     scenario = stand.scenario
     every = scenario.output.checkpoint_every_years
     observer.begin(scenario.years, stand.steps)
-    with _stop_requests() as stop:
+    with _stop_requests(observer) as stop:
         while stand.steps < scenario.years:
             record = stand.step()
             writer.append_year(record.year, record.tables, record.samples)
@@ -151,7 +154,7 @@ def _create(
     scenario: Scenario, out: Path, threads: int, command: Sequence[str], overwrite: bool
 ) -> RunWriter:
     n = len(scenario.planting_positions()[0])
-    writer = RunWriter.create(
+    return RunWriter.create(
         out,
         scenario_toml=scenario.to_toml(),
         digest=scenario.digest(),
@@ -163,17 +166,12 @@ def _create(
         command=command,
         overwrite=overwrite,
     )
-    remove_checkpoints(out)
-    return writer
 
 
-def _resumed(
-    scenario: Scenario, out: Path, threads: int, command: Sequence[str]
-) -> tuple[Stand | None, RunWriter | None] | None:
-    """Open a run to go on with: (stand, writer), (None, None) if complete, None to start over."""
+def _is_complete(scenario: Scenario, out: Path) -> bool:
+    """Tell whether a run file holds all years of its scenario; refuse that of another one."""
     with open_run(out) as run:
-        done = run.scenario
-        if done.with_overrides([f"years={scenario.years}"]) != scenario:
+        if not _same_but_for_years(run.scenario, scenario):
             raise InputError(
                 "was made by a different scenario",
                 where=f"--resume {out}",
@@ -186,49 +184,66 @@ def _resumed(
                 where=f"--resume {out}",
                 expected=f"years = {years_done} or more",
             )
-        if run.complete and years_done == scenario.years:
-            return None, None
-    found = latest_checkpoint(out)
-    if found is None:
-        return None
-    from forest.stand import Stand
-
-    arrays, meta = found
-    writer = RunWriter.reopen(
-        out,
-        rows=meta["rows"],
-        years_done=int(meta["step"]),
-        threads=threads,
-        command=command,
-    )
-    try:
-        return Stand.restore(scenario, arrays, meta), writer
-    except BaseException:
-        writer.close()
-        raise
+        return run.complete and years_done == scenario.years
 
 
-def _thread_count(threads: int | None) -> int:
-    available = int(os.environ.get("NUMBA_NUM_THREADS", 0)) or len(os.sched_getaffinity(0))
-    if threads is None:
-        return available
-    if not 1 <= threads <= available:
-        raise InputError(
-            f"{threads} threads", where="--threads", expected=f"1 to {available} on this machine"
-        )
-    return threads
+def _same_but_for_years(one: Scenario, other: Scenario) -> bool:
+    """Compare two scenarios; each may choose its sample trees in its own last year."""
+    contents = []
+    for scenario in (one, other):
+        content = scenario.model_dump()
+        last = scenario.start_year + content.pop("years") - 1
+        samples = content["output"]["sample_trees"]
+        if samples["at_year"] == last:
+            samples["at_year"] = None
+        contents.append(content)
+    return contents[0] == contents[1]
+
+
+def _check_nothing_is_lost(out: Path) -> None:
+    """Refuse to start a run over whose checkpoints must have been removed."""
+    with open_run(out) as run:
+        if run.complete or len(run.years) >= run.scenario.output.checkpoint_every_years:
+            raise InputError(
+                f"holds {len(run.years)} years, but its checkpoints are gone",
+                where=f"--resume {out}",
+                expected=f"{out.name}.checkpoint-*.npz beside it; to start over, overwrite it",
+            )
 
 
 @contextmanager
-def _stop_requests() -> Iterator[threading.Event]:
-    """Turn SIGINT and SIGTERM into a request to stop after the year."""
+def _threads(wanted: int | None) -> Iterator[int]:
+    """Compute with so many threads, all by default; give their number."""
+    import numba
+
+    before, available = numba.get_num_threads(), numba.config.NUMBA_NUM_THREADS
+    count = available if wanted is None else wanted
+    if not 1 <= count <= available:
+        raise InputError(
+            f"{count} threads", where="threads", expected=f"1 to {available} on this machine"
+        )
+    numba.set_num_threads(count)
+    try:
+        yield count
+    finally:
+        numba.set_num_threads(before)
+
+
+@contextmanager
+def _stop_requests(observer: Observer) -> Iterator[threading.Event]:
+    """Turn the first SIGINT or SIGTERM into a request to stop after the year."""
     stop = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
-    for number in before:
-        signal.signal(number, lambda *_: stop.set())
+
+    def ask(number: int, _frame: object) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt("stopped at once; --resume goes on from the last checkpoint")
+        stop.set()
+        observer.say("finishing the year; again to stop at once")
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stop
     finally:

@@ -159,6 +159,8 @@ class RunWriter:
         *,
         rows: Mapping[str, int],
         years_done: int,
+        scenario_toml: str = "",
+        digest: str = "",
         threads: int = 1,
         command: Sequence[str] = (),
     ) -> RunWriter:
@@ -172,6 +174,8 @@ class RunWriter:
             `row_counts()` at the checkpoint.
         years_done : int
             Whole years at the checkpoint.
+        scenario_toml, digest : str
+            The scenario that it goes on with, if it is for more years than the one on file.
         threads, command
             As for `create`, for the record.
 
@@ -188,7 +192,13 @@ class RunWriter:
             writer._trim(rows, years_done)
             session = begin_session(threads, years_before=years_done, command=command)
             old = writer._provenance()
-            writer._set_provenance(old.model_copy(update={"sessions": (*old.sessions, session)}))
+            changes: dict[str, Any] = {"sessions": (*old.sessions, session)}
+            if scenario_toml:
+                changes["scenario_sha256"] = digest
+                writer._file.attrs.update(
+                    {"scenario_toml": scenario_toml, "scenario_sha256": digest}
+                )
+            writer._set_provenance(old.model_copy(update=changes))
             writer._file.attrs["finished"] = ""
             writer._commit()
         except BaseException:
