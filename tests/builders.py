@@ -79,7 +79,7 @@ def _grow_tree(rng: Generator, m: Metamers, start: int, n: int, internode_m: flo
     for i in range(n):
         k = start + i
         length = internode_m * rng.uniform(0.5, 1.5)
-        direction = _unit(rng.normal(size=3) + (0.0, 0.0, 0.8))
+        direction = _unit(rng.normal((0.0, 0.0, 0.8)))
         m.bud[k] = _unit(rng.normal(size=3))
         m.length[k] = length
         if i == 0:

@@ -65,10 +65,10 @@ def make_perception(
 class _Bud(NamedTuple):
     """A bud's near-field voxel and the units of shade it casts."""
 
-    x: int
-    y: int
-    z: int
-    own: int
+    x: Any
+    y: Any
+    z: Any
+    own: Any
 
 
 @inline
