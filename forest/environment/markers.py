@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.environment import marker_kernels, marker_tiles
+from forest.environment import marker_directions, marker_kernels, marker_tiles
 from forest.environment.marker_buds import Buds, BudSpace, list_buds
 from forest.environment.marker_tiles import (
     CELLS,
@@ -200,8 +200,10 @@ class MarkerSpace:
             tiles,
             room,
         )
-        first, won = marker_kernels.sort_won(winner, cloud_winner, entries.bud, len(buds.species))
-        direction = marker_kernels.directions(
+        first, won = marker_directions.sort_won(
+            winner, cloud_winner, entries.bud, len(buds.species)
+        )
+        direction = marker_directions.directions(
             lattice, entries, cloud, tiles, winner, cloud_winner, first, won
         )
         return np.diff(first).astype(np.int32), direction

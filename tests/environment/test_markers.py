@@ -47,6 +47,8 @@ def all_cells(space: MarkerSpace, buds, reach: float, periodic: bool) -> list:
 
 def expect(buds, space: MarkerSpace, seed: int, species, periodic: bool, keep=None, extra=()):
     """The twin's answer, and the markers that it says are taken."""
+    if not buds:
+        return set(), [], np.zeros((0, 3))
     reach = max(max(row[:2]) for row in as_rows(species))
     cell = space.cell_m
     markers = [
@@ -104,20 +106,17 @@ def test_the_paper_deletes_markers_for_good(seed: int, periodic: bool) -> None:
     extra = rng.uniform((0, 0, 0), (*SIZE, 0.8), (6, 3))
     space = MarkerSpace(seed, SPACING, SIZE, periodic, False, (), extra)
     buds = twin.living_buds(*first)
-    gone: set = set()
-    if buds:
-        gone, _, _ = expect(buds, space, seed, species, periodic, None, extra)
+    gone, _, _ = expect(buds, space, seed, species, periodic, None, extra)
     space.claim(*first, species)
     resumed = MarkerSpace(seed, SPACING, SIZE, periodic, False, (), extra)
     resumed.restore(space.state())
     found = space.claim(*second, species)
     buds = twin.living_buds(*second)
-    if buds:
-        left = [tuple(p) for p in extra if tuple(p) not in gone]
-        _, count, _ = expect(
-            buds, space, seed, species, periodic, lambda point: point not in gone, left
-        )
-        assert found.found.tolist() == count
+    left = [tuple(p) for p in extra if tuple(p) not in gone]
+    _, count, _ = expect(
+        buds, space, seed, species, periodic, lambda point: point not in gone, left
+    )
+    assert found.found.tolist() == count
     assert same(found, resumed.claim(*second, species))
 
 
