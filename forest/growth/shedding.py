@@ -124,6 +124,30 @@ def close_ranks(arena: Metamers, start, n, gone, new_index):  # type: ignore[no-
     return kept
 
 
+@njit
+def _shed_tree(arena, trees, row, t, drop_bare, work, ints):  # type: ignore[no-untyped-def]
+    """Drop the poor and bare branches of one tree."""
+    sp = trees.species[row]
+    s = trees.start[row]
+    n = np.int64(trees.size[row])
+    e = s + n
+    gone = mark_shed(
+        arena.parent[s:e],
+        arena.state[s:e],
+        arena.light[s:e],
+        arena.sapwood[s:e],
+        arena.order[s:e],
+        t.of[sp].shed_below,
+        drop_bare,
+        t.of[sp].branch_pipe,
+        work[0],
+        work[1],
+        ints,
+    )
+    if gone > 0:
+        trees.size[row] = close_ranks(arena, s, n, ints[2], ints[0])
+
+
 @njit_parallel
 def shed(  # type: ignore[no-untyped-def]
     arena: Metamers,
@@ -137,26 +161,9 @@ def shed(  # type: ignore[no-untyped-def]
     for b in prange(BINS):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
-            sp = trees.species[row]
-            s = trees.start[row]
             n = np.int64(trees.size[row])
-            e = s + n
             f = shared.place[b] * FLOATS
             g = shared.place[b] * INTEGERS
             work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
             ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
-            gone = mark_shed(
-                arena.parent[s:e],
-                arena.state[s:e],
-                arena.light[s:e],
-                arena.sapwood[s:e],
-                arena.order[s:e],
-                traits.of[sp].shed_below,
-                drop_bare,
-                traits.of[sp].branch_pipe,
-                work[0],
-                work[1],
-                ints,
-            )
-            if gone > 0:
-                trees.size[row] = close_ranks(arena, s, n, ints[2], ints[0])
+            _shed_tree(arena, trees, row, traits, drop_bare, work, ints)
