@@ -87,8 +87,15 @@ def run(
     """
     from forest.errors import InputError
 
+    to = out or Path(f"{scenario.stem}.h5")
     if resume and force:
         raise InputError("--resume and --force exclude each other", expected="one of them")
+    if to.is_file() and not (resume or force):
+        raise InputError(
+            "exists already",
+            where=str(to),
+            expected="a new path, --resume to go on with it, or --force to replace it",
+        )
     changes = list(overrides or [])
     if years is not None:
         changes.append(f"years={years}")
@@ -96,15 +103,16 @@ def run(
         changes.append(f"seed={seed}")
     asked = _load(scenario, changes)
 
+    from forest.progress import Bar
     from forest.simulate import simulate
 
     finished = simulate(
         asked,
-        out or Path(f"{scenario.stem}.h5"),
+        to,
         threads=threads,
         resume=resume,
         overwrite=force,
-        progress=not no_progress,
+        progress=Bar(years=not no_progress),
         command=["forest", *sys.argv[1:]],
     )
     with finished:

@@ -38,10 +38,17 @@ class Silent:
 
 
 class Bar:
-    """Writes to standard error."""
+    """Writes to standard error.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    years : bool
+        Whether to show the years as they go by, or only say what else there is to say.
+    """
+
+    def __init__(self, *, years: bool = True) -> None:
         self._console = Console(stderr=True)
+        self._shows_years = years
         self._progress: Progress | None = None
         self._years = 0
         self._last_line = 0.0
@@ -54,7 +61,7 @@ class Bar:
         """Start the bar."""
         self._years = years
         self._last_line = time.monotonic()
-        if not self._console.is_terminal:
+        if not (self._shows_years and self._console.is_terminal):
             return
         self._progress = Progress(
             TextColumn("growing"),
@@ -71,6 +78,8 @@ class Bar:
 
     def year_done(self, stand: Stand) -> None:
         """Show the year, the trees and the metamers."""
+        if not self._shows_years:
+            return
         rows = stand.rows
         what = f"{len(rows.tree_id)} trees, {int(rows.size.sum()):,} metamers"
         if self._progress is not None:

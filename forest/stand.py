@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from forest.dynamics.planting import seedlings
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
-from forest.errors import InputError
+from forest.errors import InputError, nearest
 from forest.growth import budget
 from forest.growth.allocate import allocate
 from forest.growth.dealing import Deal, Workbench, deal
@@ -22,6 +22,7 @@ from forest.growth.shedding import shed
 from forest.growth.shoots import extend, headings, shooting_buds, sprout
 from forest.measure.rings import remember_breast
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
+from forest.record.schema import CAUSES
 from forest.trees import table
 from forest.trees.metamers import Arena
 from forest.trees.pruning import cut_branch
@@ -226,6 +227,12 @@ class Stand:
             The new trees' ids.
         """
         names = [species] * len(x) if isinstance(species, str) else list(species)
+        if not len(x) == len(y) == len(names):
+            raise InputError(
+                f"{len(x)} x, {len(y)} y and {len(names)} species",
+                where="Stand.plant",
+                expected="as many of each",
+            )
         known = {name: k for k, name in enumerate(self.species_names)}
         for name in names:
             if name not in known:
@@ -244,13 +251,13 @@ class Stand:
                 where="Stand.plant",
                 expected=f"0 to {width} and 0 to {depth} m",
             )
+        if self.scenario.plot.boundary == "periodic":
+            at = at[0] % width, at[1] % depth
         first = self._next_id
         self._plant(*at, np.array([known[name] for name in names], np.int16))
         return list(range(first, self._next_id))
 
-    def _plant(
-        self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]
-    ) -> None:
+    def _plant(self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]) -> None:
         more = seedlings(
             x,
             y,
@@ -275,7 +282,24 @@ class Stand:
             self._pending.append(Event.of(self, row, "planted", "none", measures))
 
     def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> None:
-        """Fell trees: they are gone at once, with an event in the next year's record."""
+        """Fell trees: they are gone at once, with an event in the next year's record.
+
+        Parameters
+        ----------
+        tree_ids : sequence of int
+            Living trees; one named twice is felled once.
+        cause : str
+            One of `forest.record.schema.CAUSES`.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree or cause; then none is felled.
+        """
+        if cause not in CAUSES:
+            raise InputError(
+                f"unknown cause '{cause}', {nearest(cause, CAUSES)}", where="Stand.fell"
+            )
         rows = [self.row_of(tree_id) for tree_id in tree_ids]
         measures = self.measure()
         alive = np.ones(len(self.rows.tree_id), np.bool_)
@@ -346,9 +370,7 @@ class Stand:
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""
-        return measure_trees(
-            self.arena.metamers, self.rows, self._measures_of, self._full_light
-        )
+        return measure_trees(self.arena.metamers, self.rows, self._measures_of, self._full_light)
 
     def skeleton(self, tree_id: int) -> Skeleton:
         """The shape of a living tree."""
@@ -402,6 +424,9 @@ class Stand:
             "step": self._step,
             "next_id": self._next_id,
             "sample_ids": list(self.sample_ids),
+            "pending": [
+                [None if value != value else value for value in event] for event in self._pending
+            ],
         }
         return arrays, meta
 
@@ -415,6 +440,10 @@ class Stand:
         stand._step = int(meta["step"])
         stand._next_id = int(meta["next_id"])
         stand.sample_ids = [int(i) for i in meta["sample_ids"]]
+        stand._pending = [
+            Event._make(np.nan if value is None else value for value in event)
+            for event in meta["pending"]
+        ]
         stand.rows = table.Trees(
             **{name: np.array(arrays[f"tree_{name}"]) for name in table.Trees._fields}
         )
