@@ -229,34 +229,44 @@ class CanopyField(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Where a far field's grid lies: see `CanopyField`."""
+    """Where a far field's grid lies: see `CanopyField`; `top` is its highest layer."""
 
-    x: int
-    y: int
-    ratio: int
-    lift: int
+    x: Any
+    y: Any
+    top: Any
+    ratio: Any
+    inverse: Any
+    lift: Any
 
 
 @inline
 def frame_of(field: Any) -> Any:
     """Take a field's place out of its arrays, for use in loops."""
-    return Frame(field.origin[0], field.origin[1], np.int64(field.ratio), np.int64(field.lift))
+    inverse = 1.0 / max(field.ratio, 1)
+    top = field.leaf.shape[0] - 1
+    return Frame(field.origin[0], field.origin[1], top, field.ratio, inverse, field.lift)
 
 
 @inline
-def transmission_at(transmission: Any, frame: Any, ix: Any, iy: Any, iz: Any) -> Any:
-    """Read T `lift` near-field voxels above a site, linear in z between voxel centres."""
-    if frame.ratio == 0:
-        return np.float32(1.0)
-    x = ix // frame.ratio - frame.x
-    y = iy // frame.ratio - frame.y
+def coarse(index: Any, inverse: Any) -> Any:
+    """Divide a voxel's number by a ratio, rounding down, without the slow integer division.
+
+    The half keeps the quotient clear of whole numbers, so that rounding errors do not matter.
+    """
+    return np.int64(np.floor((index + 0.5) * inverse))
+
+
+@inline
+def layers_above(frame: Any, iz: Any) -> Any:
+    """Find the two layers between whose centres a site reads T, and the share of the upper.
+
+    The point lies `lift` near-field voxels above the site's.
+    """
     twice = 2 * frame.ratio
     above = max(2 * (iz + frame.lift) + 1 - frame.ratio, 0)
-    top = transmission.shape[0] - 1
-    z = min(above // twice, top)
-    share = np.float32(above - z * twice) / np.float32(twice)
-    low = transmission[z, y, x]
-    return low + min(share, np.float32(1.0)) * (transmission[min(z + 1, top), y, x] - low)
+    lower = min(coarse(above, 0.5 * frame.inverse), frame.top)
+    share = np.float32((above - lower * twice) * (0.5 * frame.inverse))
+    return lower, min(lower + 1, frame.top), share
 
 
 class Canopy:

@@ -9,7 +9,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from forest._jit import inline, njit, njit_parallel
-from forest.environment.light_grid import ShadowField, shadow_at, window_of
+from forest.environment.light_grid import ShadowField, place_in, window_of
 from forest.environment.obstacles import Solid, solid_at
 
 CHUNKS = 64
@@ -72,34 +72,39 @@ class _Bud(NamedTuple):
 
 
 @inline
-def _others_shadow(shadow: Any, window: Any, weights: Any, bud: Any, way: Any) -> Any:
-    """Read the shadow of a voxel near a bud without that bud's own pyramid."""
+def _own_layer(way: Any, n: Any) -> Any:
+    """Tell in which layer of a bud's own pyramid of `n` layers a voxel lies; -1 if in none."""
     dx, dy, dz = way
-    found = shadow_at(shadow, window, bud.x + dx, bud.y + dy, bud.z + dz)
-    depth = -dz
-    if depth >= 0 and depth < len(weights) and abs(dx) <= depth and abs(dy) <= depth:
-        found -= np.int64(weights[depth]) * bud.own
-    return found
+    inside = dz <= 0 and -dz < n and abs(dx) <= -dz and abs(dy) <= -dz
+    return -dz if inside else -1
 
 
 @njit
-def _against_gradient(shadow: Any, window: Any, weights: Any, bud: Any, out: Any) -> None:
+def _against_gradient(field: Any, bud: Any, out: Any) -> None:
     """Set a unit vector against the gradient of the shadow; zero where it is flat."""
-    x = _others_shadow(shadow, window, weights, bud, (-1, 0, 0)) - _others_shadow(
-        shadow, window, weights, bud, (1, 0, 0)
-    )
-    y = _others_shadow(shadow, window, weights, bud, (0, -1, 0)) - _others_shadow(
-        shadow, window, weights, bud, (0, 1, 0)
-    )
-    z = _others_shadow(shadow, window, weights, bud, (0, 0, -1)) - _others_shadow(
-        shadow, window, weights, bud, (0, 0, 1)
-    )
-    length = np.sqrt(np.float64(x) ** 2 + np.float64(y) ** 2 + np.float64(z) ** 2)
-    if length == 0.0:
-        length = 1.0
-    out[0] = x / length
-    out[1] = y / length
-    out[2] = z / length
+    shadow = field.shadow
+    weights = field.weights
+    window = window_of(field)
+    squares = 0.0
+    for axis in range(3):
+        slope = np.int64(0)
+        for side in (-1, 1):
+            way = (
+                side if axis == 0 else 0,
+                side if axis == 1 else 0,
+                side if axis == 2 else 0,
+            )
+            z, y, x = place_in(window, bud.x + way[0], bud.y + way[1], bud.z + way[2])
+            found = np.int64(shadow[z, y, x]) if z >= 0 else np.int64(0)
+            layer = _own_layer(way, len(weights))
+            if layer >= 0:
+                found -= np.int64(weights[layer]) * bud.own
+            slope -= side * found
+        out[axis] = slope
+        squares += np.float64(slope) ** 2
+    if squares > 0.0:
+        for axis in range(3):
+            out[axis] /= np.sqrt(squares)
 
 
 @njit
@@ -120,7 +125,10 @@ def _to_least_shadow(
     hy = heading[1]
     hz = heading[2]
     obstructed = solid.mask.size > 1
-    here = _others_shadow(shadow, window, weights, bud, (0, 0, 0))
+    z, y, x = place_in(window, bud.x, bud.y, bud.z)
+    here = np.int64(0)
+    if z >= 0:
+        here = np.int64(shadow[z, y, x]) - np.int64(weights[0]) * bud.own
     least = np.int64(2**62)
     best = -1
     differs = False
@@ -134,7 +142,11 @@ def _to_least_shadow(
             continue
         if obstructed and solid_at(solid, bud.x + way[0], bud.y + way[1], bud.z + way[2]):
             continue
-        found = _others_shadow(shadow, window, weights, bud, way)
+        z, y, x = place_in(window, bud.x + way[0], bud.y + way[1], bud.z + way[2])
+        found = np.int64(shadow[z, y, x]) if z >= 0 else np.int64(0)
+        layer = _own_layer(way, len(weights))
+        if layer >= 0:
+            found -= np.int64(weights[layer]) * bud.own
         differs = differs or found != here
         if found < least:
             least = found
@@ -157,9 +169,6 @@ def _directions(
     n = len(species)
     out = np.empty((n, 3), np.float32)
     for chunk in prange(CHUNKS):
-        shadow = field.shadow
-        weights = field.weights
-        window = window_of(field)
         for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
             bud = _Bud(
                 np.int64(voxel[k, 0]),
@@ -168,7 +177,7 @@ def _directions(
                 np.int64(shade_units[species[k]]),
             )
             if gradient:
-                _against_gradient(shadow, window, weights, bud, out[k])
+                _against_gradient(field, bud, out[k])
             else:
                 _to_least_shadow(field, solid, around, bud, species[k], heading[k], out[k])
     return out

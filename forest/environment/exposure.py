@@ -15,14 +15,14 @@ from numba import prange
 from numpy.typing import NDArray
 
 from forest._jit import inline, njit, njit_parallel
-from forest.environment.canopy import Canopy, CanopyField, frame_of, transmission_at
+from forest.environment.canopy import Canopy, CanopyField, coarse, frame_of, layers_above
 from forest.environment.directions import make_perception, preferred_directions
 from forest.environment.light_grid import (
     UNIT,
     ShadowField,
     ShadowGrid,
+    place_in,
     propagate,
-    shadow_at,
     window_of,
 )
 from forest.environment.obstacles import Box, Mesh, Solid, coarse_depth, solid_voxels, voxelise
@@ -163,9 +163,9 @@ def _deposit_block(
             x = ix - window.x
             counts[z, y, x] = np.uint16(min(np.int64(counts[z, y, x]) + shade * buds, limit))
         if frame.ratio > 0:
-            z = max(iz // frame.ratio, 0)
-            y = iy // frame.ratio - frame.y
-            x = ix // frame.ratio - frame.x
+            z = max(coarse(iz, frame.inverse), 0)
+            y = coarse(iy, frame.inverse) - frame.y
+            x = coarse(ix, frame.inverse) - frame.x
             leaves[z, y, x] += leaf * buds
 
 
@@ -222,7 +222,8 @@ def _read_block(
     window = window_of(near)
     frame = frame_of(far)
     unit = near.unit
-    shaded = near.limit > 0
+    near_on = near.limit > 0
+    far_on = far.ratio > 0
     base_x, base_y, base_z = _three(trees.base_voxel, tree)
     at_x, at_y, at_z = _three(trees.base_offset, tree)
     for k in range(sites[0], sites[1]):
@@ -235,11 +236,17 @@ def _read_block(
         if plot.periodic:
             ix = wrap(ix, plot.nx)
             iy = wrap(iy, plot.ny)
-        found = np.float64(transmission_at(transmission, frame, ix, iy, iz))
-        if shaded:
-            left = most - unit * shadow_at(shadow, window, ix, iy, iz)
-            # The positive part without a branch: a mispredicted one would wait for the grid.
-            found *= 0.5 * (left + abs(left))
+        found = 1.0
+        if far_on:
+            y = coarse(iy, frame.inverse) - frame.y
+            x = coarse(ix, frame.inverse) - frame.x
+            lower, upper, share = layers_above(frame, iz)
+            low = transmission[lower, y, x]
+            found = np.float64(low + share * (transmission[upper, y, x] - low))
+        if near_on:
+            z, y, x = place_in(window, ix, iy, iz)
+            left = most - unit * shadow[z, y, x] if z >= 0 else most
+            found *= max(left, 0.0)
         light[k] = np.float32(found)
 
 

@@ -16,6 +16,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from forest._jit import inline, njit, njit_parallel
+from forest.environment.voxels import wrap
 
 #: Count that stands for a bud of shade factor 1.
 UNIT = 16
@@ -159,14 +160,16 @@ def propagate(field: Any) -> None:
 
 
 class Window(NamedTuple):
-    """Where a field's grid lies: its first voxel, the layers that hold shadow, its boundary."""
+    """Where a field's grid lies: first voxel, extent, layers that hold shadow, boundary."""
 
-    x: int
-    y: int
-    z: int
-    first_layer: int
-    last_layer: int
-    periodic: int
+    x: Any
+    y: Any
+    z: Any
+    nx: Any
+    ny: Any
+    first_layer: Any
+    last_layer: Any
+    periodic: Any
 
 
 @inline
@@ -176,27 +179,32 @@ def window_of(field: Any) -> Any:
         field.origin[0],
         field.origin[1],
         field.origin[2],
+        field.counts.shape[2],
+        field.counts.shape[1],
         field.layers[0],
         field.layers[1],
-        np.int64(field.periodic),
+        field.periodic,
     )
 
 
 @inline
-def shadow_at(shadow: Any, window: Any, ix: Any, iy: Any, iz: Any) -> Any:
-    """Read the shadow of a voxel of the plot, in units of `unit`; 0 outside the grid."""
+def place_in(window: Any, ix: Any, iy: Any, iz: Any) -> Any:
+    """Find a voxel of the plot in the grid, as (z, y, x); z is -1 where there is no shadow.
+
+    The caller reads the grid itself: handing an array to a function in a loop would count
+    references to it, with atomic operations on which the threads collide.
+    """
     z = iz - window.z
-    if z < window.first_layer or z >= window.last_layer:
-        return np.int64(0)
     y = iy - window.y
     x = ix - window.x
-    _, ny, nx = shadow.shape
-    if y < 0 or y >= ny or x < 0 or x >= nx:
-        if not window.periodic:
-            return np.int64(0)
-        y %= ny
-        x %= nx
-    return np.int64(shadow[z, y, x])
+    if window.periodic:
+        y = wrap(y, window.ny)
+        x = wrap(x, window.nx)
+    elif y < 0 or y >= window.ny or x < 0 or x >= window.nx:
+        z = -1
+    if z < window.first_layer or z >= window.last_layer:
+        z = -1
+    return z, y, x
 
 
 class ShadowGrid:

@@ -168,7 +168,7 @@ def _mesh_voxels(mesh: Mesh, voxel_m: float) -> NDArray[np.int64]:
         raise InputError(
             "the mesh is smaller than a voxel", where=str(mesh.file), expected="metres as unit"
         )
-    return voxels[inside].astype(np.int64)
+    return np.asarray(voxels[inside], np.int64)
 
 
 def solid_voxels(solid: Solid) -> NDArray[np.int64]:
