@@ -1,0 +1,157 @@
+"""The same scenario gives the same bits: again, on more threads, resumed, beside another stand."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from forest.record.checkpoint import latest_checkpoint, write_checkpoint
+from forest.record.run import Run, open_run
+from forest.simulate import simulate
+from forest.stand import Stand
+from tests.tiny import (
+    YEARS,
+    assert_same_runs,
+    assert_same_state,
+    assert_same_years,
+    steps,
+    tiny,
+    write_tiny,
+)
+
+ENVIRONMENTS = {
+    "shadow": ["environment={shadow={}}"],
+    "canopy": ["environment={shadow={}, canopy={}}"],
+    "markers": ["environment={shadow={}, markers={release=false}}"],
+    "markers released": ["environment={markers={release=true}}"],
+}
+MATRIX = list(
+    itertools.product(
+        ["mass_balance", "paper"], ["borchert_honda", "priority"], ENVIRONMENTS, [False, True]
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run in one go, on one thread."""
+    return simulate(tiny(), tmp_path_factory.mktemp("straight") / "run.h5", threads=1)
+
+
+def test_run_twice(straight: Run, tmp_path: Path) -> None:
+    assert_same_runs(straight, simulate(tiny(), tmp_path / "run.h5", threads=1))
+    assert straight.trees.height_m.max() > 1.0
+    assert not straight.rings.empty
+
+
+def test_two_threads(straight: Run, tmp_path: Path) -> None:
+    assert_same_runs(straight, simulate(tiny(), tmp_path / "run.h5", threads=2))
+
+
+def test_another_seed_is_another_stand(straight: Run, tmp_path: Path) -> None:
+    with simulate(tiny("seed=2"), tmp_path / "run.h5") as other:
+        assert not straight.trees.height_m.equals(other.trees.height_m)
+
+
+@pytest.mark.parametrize("first", [1, 3, 5])
+def test_more_years_later(straight: Run, tmp_path: Path, first: int) -> None:
+    """N years, then resumed for M more, are N + M years; a year of its own samples may differ."""
+    ids = "output.sample_trees={ids=[1, 4]}"
+    out = tmp_path / "run.h5"
+    simulate(tiny(ids, f"years={first}"), out).close()
+    with (
+        simulate(tiny(ids), tmp_path / "whole.h5") as whole,
+        simulate(tiny(ids), out, resume=True) as run,
+    ):
+        assert_same_runs(whole, run)
+        assert run.scenario == tiny(ids)
+        assert run.digest == run.provenance["scenario_sha256"] == tiny(ids).digest()
+        assert [session["years_before"] for session in run.provenance["sessions"]] == [0, first]
+
+
+DIES = """
+import os, signal, sys, threading, time
+from pathlib import Path
+from forest.scenario import Scenario
+from forest.progress import Silent
+from forest.simulate import simulate
+
+class Dies(Silent):
+    def begin(self, years, done):
+        self.after, self.last = done + 2, time.monotonic()
+    def year_done(self, stand):
+        took, self.last = time.monotonic() - self.last, time.monotonic()
+        if stand.steps == self.after:
+            moment = float(sys.argv[3]) * took
+            threading.Timer(moment, os.kill, (os.getpid(), signal.SIGKILL)).start()
+
+simulate(Scenario.load(sys.argv[1]).with_overrides(["output.checkpoint_every_years=1"]),
+         sys.argv[2], resume=True, progress=Dies())
+"""
+
+
+def test_killed_and_resumed(straight: Run, tmp_path: Path) -> None:
+    """SIGKILL somewhere in a year, in its record or its checkpoint; three times."""
+    out = tmp_path / "run.h5"
+    for moment in ("0.05", "0.5", "0.9"):
+        child = subprocess.run(
+            [sys.executable, "-c", DIES, write_tiny(tmp_path), out, moment],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert child.returncode in (-signal.SIGKILL, 0), child.stderr
+    assert latest_checkpoint(out) is not None
+    every = "output.checkpoint_every_years=1"
+    with simulate(tiny(every), out, resume=True) as run:
+        assert len(run.provenance["sessions"]) > 1
+        assert_same_runs(straight, run)
+
+
+@pytest.mark.parametrize(("mode", "fate", "environment", "balance"), MATRIX)
+def test_restored_stand_goes_on_the_same(
+    tmp_path: Path, mode: str, fate: str, environment: str, balance: bool
+) -> None:
+    scenario = tiny(
+        f"mode={mode}",
+        f"growth={{bud_fate='{fate}', balance={str(balance).lower()}}}",
+        "planting.density_ha=500",
+        *ENVIRONMENTS[environment],
+    )
+    whole = Stand(scenario)
+    before = steps(whole, 3)
+    arrays, meta = whole.state()
+    write_checkpoint(tmp_path / "run.h5", arrays, meta, step=3)
+    found = latest_checkpoint(tmp_path / "run.h5")
+    assert found is not None
+    restored = Stand.restore(scenario, *found)
+    assert_same_state(whole, restored)
+    after = steps(whole, 3)
+    assert_same_years(after, steps(restored, 3))
+    assert_same_state(whole, restored)
+    assert_same_years([*before, *after], steps(Stand(scenario), 6))
+
+
+def test_two_stands_do_not_touch_each_other() -> None:
+    one, other = tiny(), tiny("mode=paper", "seed=5", "environment={shadow={}, markers={}}")
+    alone = steps(Stand(one), YEARS), steps(Stand(other), YEARS)
+    together = Stand(one), Stand(other)
+    records: tuple[list, list] = ([], [])
+    for _ in range(YEARS):
+        for stand, kept in zip(together, records, strict=True):
+            kept.append(stand.step())
+    for expected, found in zip(alone, records, strict=True):
+        assert_same_years(expected, found)
+
+
+def test_simulate_and_step_agree(straight: Run) -> None:
+    heights = [record.tables["trees"]["height_m"] for record in steps(Stand(tiny()), YEARS)]
+    with open_run(straight.path) as run:
+        for year, expected in zip(run.years, heights, strict=True):
+            found = run.read("trees", ["height_m"], years=(year, year)).height_m
+            assert found.tolist() == expected.tolist()
