@@ -14,6 +14,7 @@ from forest._jit import njit
 _MAIN = 1
 _TERMINAL = 2
 _LATERAL = 4
+_CONTINUED = 16
 
 
 @njit
@@ -25,19 +26,19 @@ def growth_shares(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     parent, state, tip, length, pipe, light : arrays (n,)
-        One tree's extent of the arena; `pipe` is d^2.
-    traits : (density, min_growth, offset_gain, light_gain, offset_length)
+        One tree's extent of the arena.
+    traits : (density, min_growth, offset_gain, light_gain, offset_length, pipe_exponent)
         kg/m3; g_i at least; gain on (1 + o_i) (0.45 in the paper); gain on p_i; the clamp length
-        ell as a multiple of the trunk's base radius.
+        ell as a multiple of the trunk's base radius; n of pipe = d^n.
     weights : float64 (2, n)
-        Filled: mean growth rate of the continuing axis (or terminal bud) and of the branch (or
-        lateral bud) at each node.
+        Filled: mean growth rate of the limbs on the continuing axis (or of the limb itself, for
+        a terminal bud) and on the branch (or of the limb itself, for a lateral bud) at each node.
     work : float64 (3, n)
-        Scratch: growth rate g of each axis at its first metamer; sums of g; light of the limb.
+        Scratch: growth rate g of each axis at its first metamer; G (eq. 15); light of the limb.
     axis_of : int32 (2, n)
-        Scratch: first metamer of the axis; number of metamers beyond.
+        Scratch: first metamer of the axis; number of limbs beyond, its own included.
     """
-    density, min_growth, offset_gain, light_gain, offset_length = traits
+    density, min_growth, offset_gain, light_gain, offset_length, exponent = traits
     n = len(parent)
     rate, total, limb_light = work[0], work[1], work[2]
     head, count = axis_of[0], axis_of[1]
@@ -46,8 +47,10 @@ def growth_shares(  # type: ignore[no-untyped-def]
     moment_x = 0.0
     moment_y = 0.0
     all_light = 0.0
+    square = 2.0 / exponent  # d^2 = pipe^square
     for i in range(n):
-        m = density * 0.25 * np.pi * np.float64(pipe[i]) * np.float64(length[i])
+        area = np.float64(pipe[i]) if square == 1.0 else np.float64(pipe[i]) ** square
+        m = density * 0.25 * np.pi * area * np.float64(length[i])
         p = parent[i]
         x0 = np.float64(tip[p, 0]) if i > 0 else 0.0
         y0 = np.float64(tip[p, 1]) if i > 0 else 0.0
@@ -65,7 +68,7 @@ def growth_shares(  # type: ignore[no-untyped-def]
         total[head[i]] = np.float64(i)  # the last metamer of each axis
     centre_x = moment_x / mass if mass > 0.0 else 0.0
     centre_y = moment_y / mass if mass > 0.0 else 0.0
-    ell = max(offset_length * 0.5 * np.sqrt(np.float64(pipe[0])), 1e-6)
+    ell = max(offset_length * 0.5 * np.float64(pipe[0]) ** (0.5 * square), 1e-6)
     for i in range(n):
         if head[i] != i:
             continue
@@ -83,11 +86,17 @@ def growth_shares(  # type: ignore[no-untyped-def]
         share = limb_light[i] / all_light if all_light > 0.0 else 0.0
         rate[i] = min_growth + offset_gain * (1.0 + offset) + light_gain * share
     for i in range(n):
-        total[i] = rate[head[i]]
-        count[i] = 1
+        total[i] = 0.0
+        count[i] = 0
         weights[0, i] = rate[head[i]]
         weights[1, i] = rate[head[i]]
-    for i in range(n - 1, 0, -1):
+    # eq. 15: G sums over limbs; a limb counts where it ends, so once beyond each of its nodes
+    for i in range(n - 1, -1, -1):
+        if not state[i] & _CONTINUED:
+            total[i] += rate[head[i]]
+            count[i] += 1
+        if i == 0:
+            break
         p = parent[i]
         mean = total[i] / count[i]
         if state[i] & _MAIN:

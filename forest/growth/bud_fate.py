@@ -150,50 +150,51 @@ def share_priority(  # type: ignore[no-untyped-def]
     """
     n = len(parent)
     last = len(control) - 1
-    buds = ints[0]
-    follower = ints[1]
+    buds = ints[0]  # living buds beyond each node, its own included
+    follower = ints[1]  # next metamer of the axis, or -1
     items = ints[2]
+    on_branch = ints[3]  # living buds of the branch at each node
     w_max, w_min, kappa = shape
     for i in range(n):
         buds[i] = 0
+        on_branch[i] = 0
         follower[i] = -1
-    # buds[i] counts the living buds of everything that the branch at node i supports
     for i in range(n - 1, -1, -1):
         s = state[i]
-        own = buds[i] + (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
-        ints[3, i] = own
+        buds[i] += (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
         if i > 0:
+            buds[parent[i]] += buds[i]
             if s & _MAIN:
                 follower[parent[i]] = i
-            buds[parent[i]] += own
+            else:
+                on_branch[parent[i]] = buds[i]
     for head in range(n):
         if head > 0 and state[head] & _MAIN:
             continue
         v = v_base if head == 0 else v_side[parent[head]]
         count = 0
+        unlit = 0  # stand at the end of the list: they get nothing, but count in N
         i = np.int32(head)
         tip = i
         while i >= 0:
             s = state[i]
             v_main[i] = 0.0
             v_side[i] = 0.0
-            fed = s & _BRANCHED or (s & _LATERAL and order[i] < max_order)
-            if fed and q_side[i] > 0.0:
+            living = (s & _BRANCHED and on_branch[i] > 0) or (s & _LATERAL and order[i] < max_order)
+            if living and q_side[i] > 0.0:
                 items[count] = i
                 count += 1
+            elif living:
+                unlit += 1
             tip = i
             i = follower[i]
         # while the axis is walked v_side holds the mean light of each item, the sorting key
         for k in range(count):
             j = items[k]
-            number = 1
-            if state[j] & _BRANCHED:
-                on_main = ints[3, follower[j]] if follower[j] >= 0 else 0
-                number = max(1, buds[j] - on_main)
-            v_side[j] = q_side[j] / number
-        has_tip = state[tip] & _TERMINAL and q_main[tip] > 0.0
+            v_side[j] = q_side[j] / max(1, on_branch[j])
+        has_tip = state[tip] & _TERMINAL
         _sort_by_light(items, count, v_side)
-        total_items = count + (1 if has_tip else 0)
+        total_items = count + unlit + (1 if has_tip else 0)
         tip_place = 0
         if has_tip and not control[min(np.int64(order[head]), last)] > 0.0:
             while tip_place < count and v_side[items[tip_place]] >= q_main[tip]:
