@@ -45,9 +45,8 @@ _LATERAL = 4
 @njit
 def income_rate(traits, sp, vigour, year):  # type: ignore[no-untyped-def]
     """Income of one site of a species in full light at the ground, kg a year."""
-    return (
-        traits.of[sp].light_use * traits.of[sp].leaf_area * vigour * year.income_factor / year.full_light
-    )
+    per_site = traits.of[sp].light_use * traits.of[sp].leaf_area
+    return per_site * vigour * year.income_factor / year.full_light
 
 
 @njit
@@ -78,6 +77,7 @@ def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-unty
             t.of[sp].offset_gain,
             t.of[sp].light_gain,
             t.of[sp].offset_length,
+            t.of[sp].pipe_exponent,
         )
         growth_shares(
             parent, state, tip, length, pipe, light, traits, weights, work[8:11], ints[0:2]
@@ -227,7 +227,7 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
 
 @njit
 def _allocate_balanced(arena, trees, row, t, year, accounts, work, ints):  # type: ignore[no-untyped-def]
-    """The annual mass balance of one tree: income, leaves, upkeep, spend, and what buds may make."""
+    """The annual mass balance of one tree: income, costs, spend, and what buds may make."""
     s = trees.start[row]
     n = trees.size[row]
     e = s + n

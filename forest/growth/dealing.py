@@ -85,7 +85,5 @@ class Workbench:
         need = int(shared.place[-1])
         if len(self._scratch.integers) < need * INTEGERS:
             roomy = need + need // 4 + 64
-            self._scratch = Scratch(
-                np.empty(roomy * FLOATS), np.empty(roomy * INTEGERS, np.int32)
-            )
+            self._scratch = Scratch(np.empty(roomy * FLOATS), np.empty(roomy * INTEGERS, np.int32))
         return self._scratch

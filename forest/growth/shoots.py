@@ -66,6 +66,12 @@ def _made(v, most):  # type: ignore[no-untyped-def]
     return min(np.int64(v), most)
 
 
+@njit
+def _fraction(v):  # type: ignore[no-untyped-def]
+    """The part of a resource that makes no whole metamer, below 1 in float32 too."""
+    return min(v - np.floor(v), 0.9999999)
+
+
 @njit_parallel
 def _count(arena: Metamers, trees: Trees, shared: Deal, traits: SpeciesTraits, shoots, new):  # type: ignore[no-untyped-def]
     for b in prange(BINS):
@@ -292,19 +298,14 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
         p = np.int64(shoots.metamer[j])
         bud = np.int64(shoots.bud[j])
         v = np.float64(arena.resource[s + p, bud])
-        arena.resource[s + p, bud] = 0.0 if year.paper else v - np.floor(v)
         n = _made(v, most)
         vx, vy, vz = (
             np.float64(toward[j, 0]),
             np.float64(toward[j, 1]),
             np.float64(toward[j, 2]),
         )
-        if t.of[sp].sylleptic > 0.0:
-            wait_p[0], wait_bud[0], wait_v[0] = p, bud, min(v, most + 0.999)
-            waiting = 1
-        else:
-            wait_p[0], wait_bud[0], wait_v[0] = p, bud, np.float64(n)
-            waiting = 1
+        wait_p[0], wait_bud[0], wait_v[0] = p, bud, n + (v - np.floor(v))
+        waiting = 1
         while waiting > 0:
             waiting -= 1
             p, bud, left = wait_p[waiting], wait_bud[waiting], wait_v[waiting]
@@ -318,6 +319,7 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
             if year.paper and t.of[sp].sylleptic == 0.0:
                 unit *= min(v / n, 2.0)  # l = v / n (4.2)
             hx, hy, hz = bud_heading(arena, s, p, bud)
+            arena.resource[s + p, bud] = 0.0
             made = 0
             while left >= 1.0:
                 hx, hy, hz = _steered(t, sp, eta, hx, hy, hz, vx, vy, vz)
@@ -331,9 +333,7 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
                 height = np.uint8(255 * made // n) if made < n else np.uint8(255)
                 main = bud == TERMINAL_BUD or made > 1
                 _bear(arena, s, p, TERMINAL_BUD if main else LATERAL_BUD)
-                _add(
-                    arena, trees, row, end, p, main, hx, hy, hz, unit, order, t, year, height
-                )
+                _add(arena, trees, row, end, p, main, hx, hy, hz, unit, order, t, year, height)
                 p = np.int64(end)
                 end += 1
                 left -= 1.0
@@ -341,11 +341,18 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
                     # all buds are equivalent: what is left goes on to both buds of the node
                     side = (1.0 - bias) * left
                     left = bias * left
-                    if side >= 1.0 and waiting < _STACK and order < t.of[sp].max_order:
+                    if order >= t.of[sp].max_order:
+                        continue
+                    if side >= 1.0 and waiting < _STACK:
                         wait_p[waiting], wait_bud[waiting], wait_v[waiting] = p, LATERAL_BUD, side
                         waiting += 1
+                    elif not year.paper:
+                        arena.resource[s + p, LATERAL_BUD] = _fraction(side)
             if made > 0 and t.of[sp].sympodial == 0.0:
                 arena.state[s + p] |= np.uint8(_TERMINAL)
+            if not year.paper:  # what makes no whole metamer stays with the bud that ends the shoot
+                apex = LATERAL_BUD if t.of[sp].sympodial > 0.0 else TERMINAL_BUD
+                arena.resource[s + p, apex if made > 0 else bud] = _fraction(left)
     trees.size[row] = end
 
 
@@ -372,24 +379,19 @@ def extend(
     """
     for b in prange(BINS):
         for k in range(shared.first[b], shared.first[b + 1]):
-            _extend_tree(
-                arena, trees, shared.rows[k], shoots, toward, traits, year, solid, voxel_m
-            )
+            _extend_tree(arena, trees, shared.rows[k], shoots, toward, traits, year, solid, voxel_m)
 
 
 @njit
 def sprout(arena: Metamers, trees: Trees, first_row, traits: SpeciesTraits, year: Year):  # type: ignore[no-untyped-def]
-    """Give each tree from `first_row` on its first metamer: an upright internode with a terminal bud."""
+    """Give each tree from `first_row` on its first metamer, upright and with a terminal bud."""
     for row in range(first_row, len(trees.tree_id)):
         sp = trees.species[row]
         s = trees.start[row]
         unit = traits.of[sp].internode_length * curve(
             traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, 0.0
         )
-        _add(
-            arena, trees, row, 0, -1, True, 0.0, 0.0, 1.0, unit, 0, traits, year, np.uint8(255)
-        )
+        _add(arena, trees, row, 0, -1, True, 0.0, 0.0, 1.0, unit, 0, traits, year, np.uint8(255))
         arena.state[s] = _TERMINAL | _LATERAL
         arena.pipe[s] = traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent
-        arena.sapwood[s] = arena.pipe[s]
         trees.size[row] = 1
