@@ -1,0 +1,138 @@
+"""Thickening against its slow twin, and the identities that hold whatever grew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from forest.growth.budget import ACCOUNTS, EXTENSION, RESERVE_CHANGE, RING, SPEND
+from forest.growth.dealing import Workbench, deal
+from forest.growth.pipes import SUPPORT, reinforce, thicken
+from forest.trees.metamers import LATERAL
+from tests.builders import random_arena
+from tests.growth.growing import copied, extent, make_species, make_traits, make_year
+from tests.growth.test_budget import prices_of
+from tests.reference import pipes as slow
+from tests.reference.plant import read_plant
+
+seeds = st.integers(0, 2**32 - 1)
+TREE = make_species()
+STEP = 9
+
+
+def _thicken(m, trees, traits, year, accounts) -> None:  # type: ignore[no-untyped-def]
+    shared = deal(trees.size)
+    thicken(m, trees, shared, Workbench().scratch(shared), traits, year, accounts)
+
+
+def _newborn(rng: np.random.Generator, m, trees) -> None:  # type: ignore[no-untyped-def]
+    """Make the tree's last metamers those of this year; they have no wood yet."""
+    n = int(trees.size[0])
+    s = int(trees.start[0])
+    first = max(1, n - int(rng.integers(0, 8)))
+    m.birth[s : s + first] = STEP - 1
+    m.birth[s + first : s + n] = STEP
+    m.pipe[s + first : s + n] = 0.0
+    m.sapwood[s + first : s + n] = 0.0
+
+
+@given(seeds, st.sampled_from([2.0, 2.5, 3.0]))
+def test_paper_mode(seed: int, exponent: float) -> None:
+    rng = np.random.default_rng(seed)
+    m, trees = random_arena(rng, 1, 30)
+    _newborn(rng, m, trees)
+    traits = make_traits(
+        make_species(wood={"pipe_exponent": exponent, "twig_diameter_m": 0.01}), paper=True
+    )
+    nodes = read_plant(m, trees, 0)
+    expected = slow.thicken_paper(nodes, STEP, 0.01**exponent)
+    _thicken(m, trees, traits, make_year(STEP, paper=True), np.zeros((1, ACCOUNTS)))
+    for index, pipe in expected.items():
+        np.testing.assert_allclose(m.pipe[extent(trees, 0)][index], pipe, rtol=1e-5)
+
+
+def test_paper_mode_remembers() -> None:
+    """d^n = d1^n + d2^n + what grew here: after branches are cut nothing gets thinner."""
+    m, trees = random_arena(np.random.default_rng(2), 1, 60)
+    s, n = int(trees.start[0]), int(trees.size[0])
+    here = extent(trees, 0)
+    m.birth[here] = STEP
+    m.pipe[here] = 0.0
+    traits = make_traits(TREE, paper=True)
+    _thicken(m, trees, traits, make_year(STEP, paper=True), np.zeros((1, ACCOUNTS)))
+    strand = TREE.wood.twig_diameter_m**TREE.wood.pipe_exponent
+    above = np.bincount(m.parent[here][1:], m.pipe[s + 1 : s + n], minlength=n)
+    np.testing.assert_allclose(m.pipe[here], above + strand, rtol=1e-5)
+    whole = m.pipe[here].copy()
+    trees.size[0] = n // 2
+    _thicken(m, trees, traits, make_year(STEP + 1, paper=True), np.zeros((1, ACCOUNTS)))
+    np.testing.assert_array_equal(m.pipe[s : s + n // 2], whole[: n // 2])
+
+
+@given(seeds, st.sampled_from([0.0, 0.02, 0.4, 10.0]), st.booleans())
+def test_mass_balance(seed: int, spend: float, dark: bool) -> None:
+    """Pipes, sapwood and accounts; the mass that is laid down is the mass that is booked."""
+    rng = np.random.default_rng(seed)
+    m, trees = random_arena(rng, 1, 30)
+    _newborn(rng, m, trees)
+    here = extent(trees, 0)
+    m.pipe[here] *= rng.choice([0.01, 1.0], int(trees.size[0]))
+    m.sapwood[here] = 0.7 * m.pipe[here]
+    if dark:
+        m.light[here] = 0.0
+    trees.reserve[0] = 1.0
+    traits, year = make_traits(TREE), make_year(STEP)
+    prices = prices_of(traits, float(trees.vigour[0]), year)
+    nodes = read_plant(m, trees, 0)
+    expected = slow.thicken_balanced(nodes, STEP, prices, spend)
+    accounts = np.zeros((1, ACCOUNTS))
+    accounts[0, SPEND] = spend
+    before = copied(m)
+    _thicken(m, trees, traits, year, accounts)
+    for node in nodes:
+        k = int(trees.start[0]) + node.index
+        np.testing.assert_allclose(m.pipe[k], expected.pipe[node.index], rtol=1e-5)
+        np.testing.assert_allclose(m.sapwood[k], expected.sapwood[node.index], rtol=1e-5)
+    assert (m.pipe[here] >= before.pipe[here]).all()
+    booked = accounts[0, EXTENSION] + accounts[0, RING]
+    np.testing.assert_allclose(accounts[0, EXTENSION], expected.extension, rtol=1e-5)
+    np.testing.assert_allclose(accounts[0, RING], expected.ring, rtol=1e-5, atol=1e-12)
+    short = max(0.0, expected.extension - spend)
+    kept = expected.kept - short
+    np.testing.assert_allclose(trees.reserve[0], 1.0 + kept, rtol=1e-5)
+    np.testing.assert_allclose(accounts[0, RESERVE_CHANGE], kept, rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(booked + kept, spend, rtol=1e-5, atol=1e-9)
+    grown = (m.pipe[here].astype(float) - before.pipe[here]) * m.length[here]
+    laid = TREE.wood.density_kg_m3 * np.pi / 4 * grown.sum()
+    laid += (m.birth[here] == STEP).sum() * prices.leaf_mass
+    np.testing.assert_allclose(laid, booked, rtol=1e-5, atol=1e-9)
+
+
+def test_a_thin_limb_is_thickened_first() -> None:
+    """What is laid down before the ring makes every limb carry its load, if it can be paid."""
+    m, trees = random_arena(np.random.default_rng(6), 1, 50)
+    here = extent(trees, 0)
+    m.state[here] |= LATERAL
+    m.pipe[here] = 1e-9
+    n = int(trees.size[0])
+    leaf_mass, density = 0.02, 500.0
+    load = np.array(
+        [
+            sum(500.0 * np.pi / 4 * a.pipe * a.length + a.buds * leaf_mass for a in node.above())
+            for node in read_plant(m, trees, 0)
+        ]
+    )
+    arguments = (m.parent[here], m.length[here], m.pipe[here], density, leaf_mass, m.state[here])
+    thin = m.pipe[here].copy()
+    half = reinforce(*arguments, 1e-4, *np.empty((2, n)))
+    assert half == pytest.approx(1e-4)
+    m.pipe[here] = thin
+    reinforce(*arguments, 1e9, *np.empty((2, n)))
+    radius = np.sqrt(m.pipe[here]) / 2
+    needed = np.array([slow.needs_to_support(w, density) for w in load])
+    np.testing.assert_allclose(radius, needed, rtol=1e-5)
+    # the 300-foot limit: a cone of that height carries itself exactly (eq. 8)
+    cone = density * np.pi * 91.44 * 0.5**2 / 3
+    np.testing.assert_allclose(SUPPORT * density * 0.5**2, cone)
