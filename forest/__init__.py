@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from forest.errors import InputError
     from forest.record.run import Run, open_run
     from forest.scenario import Scenario
-    from forest.simulate import simulate
+    from forest.simulation import simulate
     from forest.species import Species, load_species
     from forest.stand import Stand
     from forest.trees.skeleton import Skeleton
@@ -29,7 +29,7 @@ _HOMES = {
     "Stand": "forest.stand",
     "load_species": "forest.species",
     "open_run": "forest.record.run",
-    "simulate": "forest.simulate",
+    "simulate": "forest.simulation",
 }
 
 __all__ = [

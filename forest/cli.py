@@ -5,9 +5,12 @@ Every command imports what it needs when it is called, so that help and refusals
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,6 +26,7 @@ _UsageError: Any = typer.BadParameter.__base__
 
 _REFUSED = 2
 _STOPPED = 130  # as shells report a process that SIGINT ended
+_UNHEARD = 1  # as typer and rich do
 
 app = typer.Typer(
     name="forest",
@@ -52,6 +56,7 @@ def _forest(context: typer.Context) -> None:
 
 @app.command()
 def run(
+    context: typer.Context,
     scenario: ScenarioFile,
     out: Annotated[
         Path | None,
@@ -104,17 +109,20 @@ def run(
     asked = _load(scenario, changes)
 
     from forest.progress import Bar
-    from forest.simulate import simulate
+    from forest.simulation import simulate
 
-    finished = simulate(
-        asked,
-        to,
-        threads=threads,
-        resume=resume,
-        overwrite=force,
-        progress=Bar(years=not no_progress),
-        command=["forest", *sys.argv[1:]],
-    )
+    try:
+        finished = simulate(
+            asked,
+            to,
+            threads=threads,
+            resume=resume,
+            overwrite=force,
+            progress=Bar(years=not no_progress),
+            command=["forest", *context.obj],
+        )
+    except KeyboardInterrupt as stop:
+        raise _Stopped(str(stop)) from None
     with finished:
         if "stand" in finished.tables:
             _print_stand_table(finished)
@@ -131,7 +139,9 @@ def check(scenario: ScenarioFile, overrides: Overrides = None) -> None:
 
         forest check my_stand.toml --set plot.boundary=open
     """
-    _print_pairs(_summary(_load(scenario, overrides or [])))
+    from forest.scenario.summary import summary
+
+    _print_pairs(summary(_load(scenario, overrides or [])))
 
 
 @app.command()
@@ -269,7 +279,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         The words after `forest`; those of this process if not given.
     """
-    sys.exit(_answer(lambda: app(args=arguments, prog_name="forest", standalone_mode=False)))
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    sys.exit(_answer(lambda: app(args=words, prog_name="forest", standalone_mode=False, obj=words)))
+
+
+class _Stopped(Exception):
+    """A run was stopped; typer would not let KeyboardInterrupt keep its message."""
 
 
 def _answer(command: Callable[[], Any]) -> int:
@@ -277,20 +292,33 @@ def _answer(command: Callable[[], Any]) -> int:
     from forest.errors import InputError
 
     try:
-        code = command()
+        with _libraries_silenced():
+            code = command()
         sys.stdout.flush()
     except _UsageError as error:
         return _refuse(error.format_message())
     except InputError as error:
         return _refuse(str(error))
-    except (KeyboardInterrupt, typer.Abort) as stop:
-        typer.echo(f"forest: {stop or 'stopped'}", err=True)
+    except (_Stopped, KeyboardInterrupt, typer.Abort) as stop:
+        typer.echo(f"forest: {str(stop) or 'stopped'}", err=True)
         return _STOPPED
     except BrokenPipeError:
         # The reader (head, less) has gone; nothing is left to say, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return _UNHEARD
     return code if isinstance(code, int) else 0
+
+
+@contextmanager
+def _libraries_silenced() -> Iterator[None]:
+    """Keep what libraries warn of off the screen: what a user must know comes as an error."""
+    logging.disable()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 def _refuse(message: str) -> int:
@@ -303,33 +331,6 @@ def _load(path: Path, overrides: Sequence[str]) -> Scenario:
 
     scenario = Scenario.load(path)
     return scenario.with_overrides(overrides) if overrides else scenario
-
-
-def _summary(scenario: Scenario) -> list[tuple[str, str]]:
-    """Say in a few lines what a scenario would grow."""
-    import numpy as np
-
-    _, _, kind = scenario.planting_positions()
-    width, depth = scenario.plot.size_m
-    counts = np.bincount(kind, minlength=len(scenario.species))
-    trees = ", ".join(
-        f"{count:,} {name}" for name, count in zip(scenario.species, counts, strict=True) if count
-    )
-    last = scenario.start_year + scenario.years - 1
-    parts = [name for name, part in scenario.environment if part is not None]
-    return [
-        ("title", scenario.title or "(none)"),
-        ("plot", f"{width:g} x {depth:g} m, {scenario.plot.boundary}"),
-        ("trees", f"{trees} ({len(kind) / (width * depth) * 1e4:,.0f} per ha)"),
-        ("years", f"{scenario.years} ({scenario.start_year} to {last})"),
-        ("mode", scenario.mode),
-        ("environment", " + ".join(parts)),
-        ("bud fate", scenario.growth.bud_fate + (", balanced" * scenario.growth.balance)),
-        ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
-        ("seed", str(scenario.seed)),
-        ("tables", ", ".join(scenario.output.tables) or "none"),
-        ("sha256", scenario.digest()),
-    ]
 
 
 def _print_pairs(pairs: Sequence[tuple[str, str]]) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
-from forest.simulate import simulate
+from forest.simulation import simulate
 from forest.stand import Stand
 from tests.tiny import (
     YEARS,
@@ -79,7 +79,7 @@ import os, signal, sys, threading, time
 from pathlib import Path
 from forest.scenario import Scenario
 from forest.progress import Silent
-from forest.simulate import simulate
+from forest.simulation import simulate
 
 class Dies(Silent):
     def begin(self, years, done):

@@ -13,7 +13,7 @@ from forest.errors import InputError
 from forest.progress import Silent
 from forest.record.checkpoint import checkpoint_paths, remove_checkpoints
 from forest.record.run import open_run
-from forest.simulate import Interrupted, simulate
+from forest.simulation import Interrupted, simulate
 from forest.stand import Stand
 from tests.tiny import YEARS, assert_same_runs, tiny
 

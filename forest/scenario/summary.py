@@ -1,0 +1,42 @@
+"""A scenario in a few lines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from forest.scenario.scenario import Scenario
+
+
+def summary(scenario: Scenario) -> list[tuple[str, str]]:
+    """Say in a few lines what a scenario would grow.
+
+    Returns
+    -------
+    list of (label, text)
+
+    Raises
+    ------
+    InputError
+        If a random planting finds no room for a tree.
+    """
+    _, _, kind = scenario.planting_positions()
+    width, depth = scenario.plot.size_m
+    counts = np.bincount(kind, minlength=len(scenario.species))
+    trees = ", ".join(
+        f"{count:,} {name}" for name, count in zip(scenario.species, counts, strict=True) if count
+    )
+    last = scenario.start_year + scenario.years - 1
+    parts = [name for name, part in scenario.environment if part is not None]
+    return [
+        ("title", scenario.title or "(none)"),
+        ("plot", f"{width:g} x {depth:g} m, {scenario.plot.boundary}"),
+        ("trees", f"{trees} ({len(kind) / (width * depth) * 1e4:,.0f} per ha)"),
+        ("years", f"{scenario.years} ({scenario.start_year} to {last})"),
+        ("mode", scenario.mode),
+        ("environment", " + ".join(parts)),
+        ("bud fate", scenario.growth.bud_fate + (", balanced" * scenario.growth.balance)),
+        ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
+        ("seed", str(scenario.seed)),
+        ("tables", ", ".join(scenario.output.tables) or "none"),
+        ("sha256", scenario.digest()),
+    ]
