@@ -77,7 +77,7 @@ def thicken_balanced(nodes: Sequence[Node], step: int, prices: Prices, spend: fl
             paid = ring * surplus[n.index] / total
             flow[n.index] += paid / prices.wood(1.0, pipe_path(n, prices.branch_pipe))
 
-    sapwood = {n.index: prices.twig_diameter**2 if n.birth == step else n.sapwood for n in nodes}
+    sapwood = {n.index: n.sapwood for n in nodes}  # rings alone: primary wood serves no site
     for lower in nodes:
         passing = sum(flow[n.index] for n in lower.above())
         here = passing * (1.0 if lower.order == 0 else prices.branch_pipe)
