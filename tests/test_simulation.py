@@ -134,6 +134,7 @@ def test_broken_checkpoint_falls_back_on_the_one_before(tmp_path: Path) -> None:
             assert run.trees.equals(whole.trees)
 
 
+@pytest.mark.filterwarnings("ignore:The VTK reader")
 def test_a_stand_that_cannot_be_built_leaves_the_old_run(tmp_path: Path) -> None:
     out, mesh = tmp_path / "run.h5", tmp_path / "rock.stl"
     simulate(tiny("years=1"), out).close()
