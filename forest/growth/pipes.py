@@ -133,7 +133,6 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
         surplus[i] = 0.0
         if birth[i] == year.step:
             pipe[i] = primary
-            arena.sapwood[s + i] = primary
             flow[i] = strand
             extension += volume * (primary * np.float64(length[i]) + strand * pipe_path[i])
             extension += t.of[sp].leaf_mass

@@ -30,7 +30,7 @@ FIELDS: dict[str, tuple[type, int, str]] = {
     "bud": (np.float32, 3, "unit direction of the lateral bud"),
     "length": (np.float32, 1, "internode length, m"),
     "pipe": (np.float32, 1, "diameter to the pipe exponent n, d^n, m^n (never decreases)"),
-    "sapwood": (np.float32, 1, "the part of pipe that is sapwood, m^n"),
+    "sapwood": (np.float32, 1, "the rings in it that still serve living branches, m^n"),
     "light": (np.float32, 1, "light Q of the buds at the node (4.1)"),
     "resource": (np.float32, 2, "resource v of the terminal and the lateral bud; their fraction"),
     "birth": (np.int16, 1, "step in which it was made, counted from the start of the run"),
