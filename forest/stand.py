@@ -316,7 +316,9 @@ class Stand:
         """
         row = self.row_of(tree_id)
         measures = self.measure()
-        gone = cut_branch(self.arena.metamers, self.rows, row, metamer)
+        kind = int(self.rows.species[row])
+        branch_pipe = float(self._traits.of["branch_pipe"][kind])
+        gone = cut_branch(self.arena.metamers, self.rows, row, metamer, branch_pipe)
         self._pending.append(Event.of(self, row, "pruned", "none", measures))
         return gone
 

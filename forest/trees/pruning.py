@@ -9,7 +9,9 @@ from forest.trees.metamers import BRANCHED, CONTINUED, MAIN, Metamers
 from forest.trees.table import Trees
 
 
-def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int) -> int:
+def cut_branch(
+    arena: Metamers, trees: Trees, row: int, serial: int, branch_pipe: float
+) -> int:
     """Remove a metamer and everything it carries, and close the gap in the tree's extent.
 
     Parameters
@@ -22,6 +24,9 @@ def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int) -> int:
         Row of the tree.
     serial : int
         Serial number of the lowest metamer that goes.
+    branch_pipe : float
+        Thickness of a pipe along branches relative to the stem (kappa): the pipes of what goes
+        are no longer sapwood below the cut.
 
     Returns
     -------
@@ -57,6 +62,13 @@ def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int) -> int:
         gone[i] = gone[parent[i]]
     bit = CONTINUED if arena.state[start + cut] & MAIN else BRANCHED
     arena.state[start + parent[cut]] &= np.uint8(255 - bit)
+    order = arena.order[part]
+    lost = float(arena.sapwood[start + cut]) / (branch_pipe if order[cut] > 0 else 1.0)
+    below = int(parent[cut])
+    while below >= 0:
+        here = lost * (branch_pipe if order[below] > 0 else 1.0)
+        arena.sapwood[start + below] = max(0.0, float(arena.sapwood[start + below]) - here)
+        below = int(parent[below])
     stays = np.flatnonzero(~gone)
     new_index = np.cumsum(~gone) - 1
     for field in arena:

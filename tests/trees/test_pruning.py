@@ -25,7 +25,7 @@ def test_what_stands_on_the_cut_goes(seed: int) -> None:
         return
     cut = nodes[int(rng.integers(1, len(nodes)))]
     gone = {node.serial for node in cut.above()}
-    assert cut_branch(m, trees, 1, cut.serial) == len(gone)
+    assert cut_branch(m, trees, 1, cut.serial, 0.35) == len(gone)
     assert_valid(m, trees)
     here, was = extent(trees, 1), extent(old, 1)
     stays = ~np.isin(before.serial[was], list(gone))
@@ -41,4 +41,4 @@ def test_refused(serial: int) -> None:
     m, trees = random_arena(np.random.default_rng(1), 1, 10)
     m.serial[extent(trees, 0)] = np.arange(int(trees.size[0]))
     with pytest.raises(InputError, match=str(serial)):
-        cut_branch(m, trees, 0, serial)
+        cut_branch(m, trees, 0, serial, 0.35)
