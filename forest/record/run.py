@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError, nearest
 from forest.record.identity import check_identity, check_run_file, damage_reported
-from forest.record.journal import JournaledFile, read_journal
+from forest.record.journal import JournaledFile
 from forest.record.schema import ALL_TABLES
 from forest.trees.skeleton import Skeleton
 
@@ -47,8 +47,8 @@ def open_run(path: str | Path) -> Run:
     path = Path(path)
     check_run_file(path)
     with damage_reported(path):
-        storage = JournaledFile(path, writable=False) if read_journal(path) else None
-        file = h5py.File(storage or path, "r", **({} if storage else {"locking": False}))
+        # Neither in the way of a writer nor of the same file opened by plain h5py.
+        file = h5py.File(JournaledFile(path, writable=False), "r")
         try:
             check_identity(file, path)
             return Run(path, file)

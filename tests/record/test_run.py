@@ -53,6 +53,12 @@ def test_population_is_a_table(run: Run) -> None:
     assert population["living_before"].tolist() == [0, *population["living"][:-1]]
 
 
+def test_plain_h5py_reads_beside_an_open_run(run: Run, path: Path) -> None:
+    with h5py.File(path) as file:
+        assert file["population/living"][0] == PLANTED
+        assert file["trees/height_m"].attrs["units"] == "m"
+
+
 def test_missing_numbers_are_nan_and_codes_have_names(tmp_path: Path) -> None:
     tables = make_year(FIRST_YEAR)
     tables["trees"]["dbh_cm"][:3] = np.nan
