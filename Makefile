@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := forest tests scenarios analysis docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-stand bench lint format docs clean
+.PHONY: help setup demo test test-stand bench bench-quick lint format docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -42,9 +42,14 @@ test-stand: $(READY)  ## tests on whole stands (minutes)
 	@$(BIN)/python -m forest.warm
 	@$(BIN)/python -m pytest -m stand
 
-bench: $(READY)  ## benchmarks: cost per metamer, voxel and year
+bench: $(READY)  ## benchmarks: time and memory per metamer; a quarter of an hour
 	@$(BIN)/python -m forest.warm
-	@$(BIN)/python -m pytest -m bench -s
+	@$(BIN)/python -m tests.benchmarks --out out/bench.json
+	@$(BIN)/python -m pytest -m bench
+
+bench-quick: $(READY)  ## the same on smaller stands, in two minutes
+	@$(BIN)/python -m forest.warm
+	@$(BIN)/python -m tests.benchmarks --quick --out out/bench.json
 
 lint: $(READY)  ## style, types, and the direction of imports
 	@$(BIN)/ruff check --quiet $(SOURCES)

@@ -1,0 +1,77 @@
+"""Measure and print everything: `python -m tests.benchmarks [--quick] [--out FILE]`.
+
+Each stand and run has a process of its own. The kernels must be compiled (`python -m forest.warm`);
+only the cold start compiles them anew, in a folder of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tests.benchmarks import costs, machine, report, runs, stands
+
+
+class Extent(NamedTuple):
+    """How much is measured."""
+
+    across: tuple[int, ...]  # tiles along each edge of the stands, of about 10^5 metamers each
+    rounds: tuple[int, ...]  # of each stand
+    run: tuple[str, ...]  # changes to the hectare
+    repeats: int  # of the paper's tree and of the warm start
+
+
+FULL = Extent(across=(1, 3, 11), rounds=(9, 5, 3), run=(), repeats=3)
+QUICK = Extent(across=(1, 3), rounds=(5, 3), run=("plot.size_m=[24, 24]", "years=30"), repeats=1)
+
+
+def measure(extent: Extent) -> dict[str, Any]:
+    """Measure everything and give it as a dict that JSON can hold."""
+    result: dict[str, Any] = {"machine": machine.describe()}
+    with tempfile.TemporaryDirectory() as folder:
+        tile = str(Path(folder) / "tile.npz")
+        _say("growing a tile", machine.alone, stands.keep_tile, tile)
+        result["stands"] = [
+            _say(f"{n} x {n} tiles", machine.alone, costs.measure_stand, tile, n, rounds)
+            for n, rounds in zip(extent.across, extent.rounds, strict=True)
+        ]
+    result["exponent"] = costs.exponent(result["stands"])
+    result["paper_tree"] = _say(
+        "the paper's tree", machine.alone, runs.grow_paper_tree, extent.repeats
+    )
+    result["run"] = _say("a run", machine.alone, runs.run_hectare, extent.run)
+    result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
+    result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
+    return result
+
+
+def _say(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    print(f"bench: {what} ... ", end="", flush=True, file=sys.stderr)
+    start = time.perf_counter()
+    found = function(*arguments)
+    print(f"{time.perf_counter() - start:.1f} s", flush=True, file=sys.stderr)
+    return found
+
+
+def main() -> None:
+    """Measure, print the table and write the JSON."""
+    words = argparse.ArgumentParser(prog="python -m tests.benchmarks")
+    words.add_argument("--quick", action="store_true", help="under two minutes")
+    words.add_argument("--out", type=Path, default=Path("out/bench.json"))
+    given = words.parse_args()
+    result = measure(QUICK if given.quick else FULL)
+    given.out.parent.mkdir(parents=True, exist_ok=True)
+    given.out.write_text(json.dumps(result, indent=1))
+    report.show(result)
+    print(f"written to {given.out}")
+
+
+if __name__ == "__main__":
+    main()

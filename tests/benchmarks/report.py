@@ -1,0 +1,157 @@
+"""The benchmark's results as one table: on the screen (rich) and for docs/performance.md.
+
+`python -m tests.benchmarks.report out/bench.json` prints the Markdown table of a saved result.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+from rich.table import Table
+
+from tests.benchmarks.targets import verdicts
+
+
+class Line(NamedTuple):
+    """A row of the table; a section has empty cells."""
+
+    what: str
+    cells: tuple[str, ...]
+
+
+HEADINGS = ("wall", "CPU", "1 thread, wall", "gain", "× touching")
+
+
+def lines(result: dict[str, Any]) -> Iterator[Line]:
+    """Give the table row by row."""
+    for stand in result["stands"]:
+        yield from _stand_lines(stand)
+    if "exponent" in result:
+        yield Line("All stands", ())
+        yield Line("exponent of a year's time over metamers", (f"{result['exponent']:.3f}",))
+    yield from _run_lines(result)
+    yield Line("Targets", ())
+    for verdict in verdicts(result):
+        met = "met" if verdict.met else "MISSED"
+        yield Line(verdict.name, (f"{verdict.value:.3g}", f"{verdict.sign} {verdict.limit:g}", met))
+
+
+def _stand_lines(stand: dict[str, Any]) -> Iterator[Line]:
+    one, most = min(stand["threads"]), max(stand["threads"])
+    alone, timed = stand["threads"][one], stand["threads"][most]
+    share = stand["metamers_with_site"] / stand["metamers"]
+    yield Line(
+        f"{stand['metamers']:,} metamers ({share:.0%} bear a living site), "
+        f"{stand['trees']:,} trees, {stand['plot_m']:g} m square; {most} threads; ns per metamer-year",
+        (),
+    )
+    for phase, entry in [*timed["phases"].items(), ("year", timed["year"])]:
+        single = alone["year"] if phase == "year" else alone["phases"][phase]
+        yield Line(
+            "whole year" if phase == "year" else phase,
+            (
+                f"{entry['wall_ns']:.1f}",
+                f"{entry['cpu_ns']:.1f}",
+                f"{single['wall_ns']:.1f}",
+                f"{stand['gain'][phase]:.2f}" if "gain" in stand else "",
+                f"{entry['times_touching']:.1f}" if "times_touching" in entry else "",
+            ),
+        )
+    year = timed["year"]
+    yield Line(
+        "whole year, per metamer with a living site", (f"{year['wall_ns_per_site_metamer']:.1f}",)
+    )
+    yield Line("a year, s", (f"{year['seconds']:.3f}",))
+    memory = stand["memory"]
+    for key, what in _MEMORY.items():
+        yield Line(what, (f"{memory[key]:.0f}",))
+    yield Line("peak of the process, GB", (f"{memory['process_peak_gb']:.2f}",))
+    yield Line(
+        f"copying, GB/s ({one} and {most} threads)",
+        (f"{timed['bandwidth_gb_s']:.1f}", "", f"{alone['bandwidth_gb_s']:.1f}"),
+    )
+    yield Line("same bits on 1 and 2 threads", ("yes" if stand["same_bits"] else "NO",))
+
+
+_MEMORY = {
+    "arena_bytes": "arena, bytes per metamer",
+    "extents_bytes": "its part given to trees, bytes per metamer",
+    "process_bytes": "process, resident bytes per metamer",
+    "peak_bytes": "process at its peak, bytes per metamer",
+}
+
+
+def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
+    run = result["run"]
+    yield Line(f"Run of {run['years']} years on {run['plot_m']:g} m square, all tables written", ())
+    yield Line("whole run, s", (f"{run['seconds']:.1f}",))
+    yield Line("metamers alive at its end", (f"{run['metamers']:,}",))
+    yield Line("metamer-years", (f"{run['metamer_years']:,}",))
+    yield Line("ns per metamer-year", (f"{run['wall_ns']:.1f}",))
+    yield Line("share of writing", (f"{run['writing_share']:.1%}",))
+    yield Line("peak of the process, GB", (f"{run['peak_gb']:.2f}",))
+    yield Line("run file, MB", (f"{run['file_mb']:.1f}",))
+    tree = result["paper_tree"]
+    yield Line("One tree in paper mode", ())
+    yield Line(
+        f"to {tree['internodes']:,} internodes in {tree['steps']} steps, s",
+        (f"{tree['seconds']:.2f}",),
+    )
+    yield Line("peak of the process, GB", (f"{tree['peak_gb']:.2f}",))
+    starts = result["starts"]
+    yield Line("Start", ())
+    yield Line("cold, to the end of the first year, s", (f"{starts['cold_s']:.1f}",))
+    yield Line("warm, to the end of the first year, s", (f"{starts['warm_s']:.2f}",))
+    yield Line("forest --help, s", (f"{starts['help_s']:.2f}",))
+
+
+def show(result: dict[str, Any]) -> None:
+    """Print the table."""
+    machine = result["machine"]
+    table = Table(
+        title=f"{machine['processor']}, {machine['cores']} cores, "
+        f"{machine['memory_gb']:.0f} GB; load before: {machine['load_before']:.1f}",
+    )
+    table.add_column("")
+    for heading in HEADINGS:
+        table.add_column(heading, justify="right")
+    for line in lines(result):
+        if line.cells:
+            table.add_row(f"  {line.what}", *line.cells)
+        else:
+            table.add_section()
+            table.add_row(f"[bold]{line.what}[/bold]")
+    console = Console()
+    if not console.is_terminal:
+        console.width = 160
+    console.print(table)
+
+
+def to_markdown(result: dict[str, Any]) -> str:
+    """Give the machine and the table as Markdown."""
+    machine = result["machine"]
+    text = [
+        f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gb']:.0f} GB; "
+        f"{machine['system']}; Python {machine['python']}, NumPy {machine['numpy']}, "
+        f"numba {machine['numba']}, forest {machine['forest']}; measured {result['finished']}, "
+        f"load average {machine['load_before']:.1f} before.",
+        "",
+        "| | " + " | ".join(HEADINGS) + " |",
+        "|---|" + "---:|" * len(HEADINGS),
+    ]
+    for line in lines(result):
+        if line.cells:
+            cells = [*line.cells, *[""] * (len(HEADINGS) - len(line.cells))]
+            text.append(f"| {line.what} | " + " | ".join(cells) + " |")
+        else:
+            text.append(f"| **{line.what}** |" + " |" * len(HEADINGS))
+    return "\n".join(text)
+
+
+if __name__ == "__main__":
+    print(to_markdown(json.loads(Path(sys.argv[1]).read_text())))

@@ -1,0 +1,52 @@
+"""What the program should reach on two cores, beside what it reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from tests.benchmarks.runs import PAPER_INTERNODES
+
+#: A stand of at least so many metamers with a living site is held to the cost of a large one.
+_LARGE = 5_000_000
+_HECTARE = {"plot_m": 100.0, "years": 100}
+
+
+class Verdict(NamedTuple):
+    """A measured value and its limit; `sign` is ≤ or ≥."""
+
+    name: str
+    value: float
+    sign: str
+    limit: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the value keeps to the limit."""
+        return self.value <= self.limit if self.sign == "≤" else self.value >= self.limit
+
+
+def verdicts(result: dict[str, Any]) -> Iterator[Verdict]:
+    """Compare a result with its targets; those of what was not measured are left out."""
+    tree, run, starts = result["paper_tree"], result["run"], result["starts"]
+    yield Verdict("paper tree: internodes", tree["internodes"], "≥", PAPER_INTERNODES)
+    yield Verdict("paper tree, s", tree["seconds"], "≤", 2.0)
+    if all(run[key] == value for key, value in _HECTARE.items()):
+        yield Verdict("hectare of 100 years, s", run["seconds"], "≤", 120.0)
+        yield Verdict("hectare of 100 years, peak GB", run["peak_gb"], "≤", 3.0)
+    large = result["stands"][-1]
+    if large["metamers_with_site"] >= _LARGE:
+        year = large["threads"][max(large["threads"])]["year"]
+        yield Verdict("large stand, ns per metamer-year", year["wall_ns"], "≤", 100.0)
+        per_site = year["wall_ns_per_site_metamer"]
+        yield Verdict("the same, per metamer with a living site", per_site, "≤", 100.0)
+    memory = large["memory"]
+    yield Verdict("arena, bytes per metamer", memory["arena_bytes"], "≤", 80.0)
+    yield Verdict("process, bytes per metamer", memory["process_bytes"], "≤", 120.0)
+    yield Verdict("exponent of cost", result["exponent"], "≤", 1.05)
+    if "gain" in large:
+        yield Verdict("2 threads over 1", large["gain"]["year"], "≥", 1.4)
+    yield Verdict("share of writing", run["writing_share"], "≤", 0.10)
+    yield Verdict("cold start, s", starts["cold_s"], "≤", 45.0)
+    yield Verdict("warm start, s", starts["warm_s"], "≤", 2.0)
+    yield Verdict("forest --help, s", starts["help_s"], "≤", 0.5)

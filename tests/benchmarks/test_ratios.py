@@ -1,0 +1,42 @@
+"""What must hold on any machine: ratios, never absolute times (`make bench`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.benchmarks.costs import exponent, measure_stand, thread_counts
+from tests.benchmarks.machine import alone
+from tests.benchmarks.runs import run_hectare
+from tests.benchmarks.stands import keep_tile
+
+pytestmark = pytest.mark.bench
+
+
+@pytest.fixture(scope="module")
+def stands(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """Stands of about 10^5 and 10^6 metamers."""
+    tile: Path = tmp_path_factory.mktemp("bench") / "tile.npz"
+    alone(keep_tile, str(tile))
+    return [alone(measure_stand, str(tile), across, 5) for across in (1, 3)]
+
+
+def test_cost_grows_no_faster_than_the_stand(stands: list[dict[str, Any]]) -> None:
+    assert exponent(stands) <= 1.1
+
+
+@pytest.mark.skipif(len(thread_counts()) < 2, reason="one core")
+def test_two_threads_help_and_change_nothing(stands: list[dict[str, Any]]) -> None:
+    assert all(stand["same_bits"] for stand in stands)
+    assert stands[-1]["gain"]["year"] >= 1.25
+
+
+def test_memory_of_a_metamer(stands: list[dict[str, Any]]) -> None:
+    assert stands[-1]["memory"]["extents_bytes"] <= 80.0
+
+
+def test_writing_is_a_small_share_of_a_run() -> None:
+    run = alone(run_hectare, ("plot.size_m=[24, 24]", "years=30"))
+    assert run["writing_share"] <= 0.15
