@@ -68,12 +68,19 @@ def _draw_panels(name: str) -> None:
     trees = [grow(name.removeprefix("figure_"), overrides)[0] for _, overrides in panels]
     for (title, _), tree in zip(panels, trees, strict=True):
         _tell(name, title, tree)
-    panel = (1000 // len(panels), 420 if len(panels) > 2 else 520)
-    draw_trees(trees, [title for title, _ in panels], TO / f"{name}.png", panel=panel)
+    columns = 2 if len(panels) == 4 else len(panels)
+    draw_trees(
+        trees,
+        [title for title, _ in panels],
+        TO / f"{name}.png",
+        columns=columns,
+        same_scale=name != "figure_06",
+        panel=(1000 // columns, 420),
+    )
 
 
 def _draw_figure_11() -> None:
-    for years in (6, 12, 18):
+    for years in (5, 12, 20):
         trees = grow("11", [f"years={years}"])
         _tell("figure_11", f"left tree, {years} years", trees[0])
         draw_stand(
@@ -86,7 +93,7 @@ def _draw_figure_21() -> None:
     titles = ["without buds", "with buds"]
     for title, tree in zip(titles, trees, strict=True):
         _tell("figure_21", title, tree)
-    draw_trees(trees, titles, TO / "figure_21.png", panel=(500, 520))
+    draw_trees(trees, titles, TO / "figure_21.png", panel=(500, 460))
 
 
 def _draw_paper_tree() -> None:

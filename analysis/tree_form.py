@@ -43,7 +43,7 @@ class Form(NamedTuple):
     width : float
         Crown diameter (98th percentile of the nodes' distance from the base) per tree height.
     clear : float
-        Height below which 2 % of the buds' nodes stand, per tree height.
+        Height below which 2 % of the branches' nodes stand, per tree height.
     droop : float
         Mean vertical part of the directions of internodes above order 0 that are up to 3 years
         old; negative: they hang.
@@ -81,7 +81,7 @@ def form_of(tree: Skeleton) -> Form:
         trunk_wood=float(wood[tree.axis == 0].sum() / wood.sum()),
         limb_wood=float(wood[tree.order == 1].sum() / wood.sum()),
         width=2.0 * float(np.percentile(reach, 98)) / height,
-        clear=float(np.percentile(node[tree.leafy, 2], 2)) / height,
+        clear=float(np.percentile(node[tree.order > 0, 2], 2)) / height,
         droop=float(heading[young, 2].mean()),
         gnarl_deg=float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).mean()),
     )

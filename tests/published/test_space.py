@@ -76,10 +76,10 @@ def test_shedding_clears_the_bole():
 
 
 def test_a_tree_goes_from_excurrent_to_decurrent():
-    young = form_of(grow("11", ["years=6"])[0])
+    young = form_of(grow("11", ["years=5"])[0])
     old = form_of(grow("11")[0])
-    assert young.leader == pytest.approx(1.0)
-    assert old.leader < 0.9
+    assert young.leader > 0.85
+    assert old.leader < 0.5
     assert old.width > 1.15 * young.width
 
 
@@ -104,8 +104,9 @@ def test_no_branch_enters_the_wall():
 
 
 def test_buds_order_what_space_colonization_leaves_wild():
-    """Fig. 21a: without buds, branches leave at any angle; with buds, at about the branching angle."""
+    """Fig. 21a: without buds, branches leave at any angle."""
     with_buds = grow("21")[0]
     without = runions(seed=1)
     assert np.std(branching_angles(with_buds)) < 0.6 * np.std(branching_angles(without))
-    assert form_of(with_buds).leader > form_of(without).leader
+    assert form_of(with_buds).gnarl_deg < 0.5 * form_of(without).gnarl_deg
+    assert form_of(with_buds).trunk_wood > 1.15 * form_of(without).trunk_wood
