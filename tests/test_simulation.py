@@ -9,6 +9,7 @@ from pathlib import Path
 import numba
 import pytest
 
+import forest
 from forest.errors import InputError
 from forest.progress import Silent
 from forest.record.checkpoint import checkpoint_paths, remove_checkpoints
@@ -163,3 +164,12 @@ def test_threads(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="999 threads"):
         simulate(tiny("years=1"), tmp_path / "b.h5", threads=999)
     assert not (tmp_path / "b.h5").exists()
+
+
+def test_public_names_are_not_hidden_by_modules() -> None:
+    """Importing a module named like a public function would put itself in its place."""
+    folder = Path(forest.__file__).parent
+    for name in forest.__all__:
+        assert not (folder / f"{name}.py").exists()
+        assert not (folder / name).exists()
+    assert forest.simulate is forest.simulate is simulate
