@@ -42,7 +42,10 @@ def measure(extent: Extent) -> dict[str, Any]:
             _say(f"{n} x {n} tiles", machine.alone, costs.measure_stand, tile, n, rounds)
             for n, rounds in zip(extent.across, extent.rounds, strict=True)
         ]
-    result["exponent"] = costs.exponent(result["stands"])
+    result["exponent"] = {
+        threads: costs.exponent(result["stands"], threads)
+        for threads in result["stands"][0]["threads"]
+    }
     result["paper_tree"] = _say(
         "the paper's tree", machine.alone, runs.grow_paper_tree, extent.repeats
     )

@@ -31,9 +31,10 @@ def lines(result: dict[str, Any]) -> Iterator[Line]:
     """Give the table row by row."""
     for stand in result["stands"]:
         yield from _stand_lines(stand)
-    if "exponent" in result:
-        yield Line("All stands", ())
-        yield Line("exponent of a year's time over metamers", (f"{result['exponent']:.3f}",))
+    yield Line("All stands", ())
+    for threads, exponent in result["exponent"].items():
+        what = f"exponent of a year's time over metamers, threads: {threads}"
+        yield Line(what, (f"{exponent:.3f}",))
     yield from _run_lines(result)
     yield Line("Targets", ())
     for verdict in verdicts(result):
@@ -47,7 +48,8 @@ def _stand_lines(stand: dict[str, Any]) -> Iterator[Line]:
     share = stand["metamers_with_site"] / stand["metamers"]
     yield Line(
         f"{stand['metamers']:,} metamers ({share:.0%} bear a living site), "
-        f"{stand['trees']:,} trees, {stand['plot_m']:g} m square; {most} threads; ns per metamer-year",
+        f"{stand['trees']:,} trees, {stand['plot_m']:g} m square; "
+        f"{most} threads; ns per metamer-year",
         (),
     )
     for phase, entry in [*timed["phases"].items(), ("year", timed["year"])]:
@@ -89,7 +91,7 @@ _MEMORY = {
 def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     run = result["run"]
     yield Line(f"Run of {run['years']} years on {run['plot_m']:g} m square, all tables written", ())
-    yield Line("whole run, s", (f"{run['seconds']:.1f}",))
+    yield Line("whole run, s", (f"{run['seconds']:.1f}", f"{run['cpu_seconds']:.1f}"))
     yield Line("metamers alive at its end", (f"{run['metamers']:,}",))
     yield Line("metamer-years", (f"{run['metamer_years']:,}",))
     yield Line("ns per metamer-year", (f"{run['wall_ns']:.1f}",))
@@ -100,12 +102,13 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line("One tree in paper mode", ())
     yield Line(
         f"to {tree['internodes']:,} internodes in {tree['steps']} steps, s",
-        (f"{tree['seconds']:.2f}",),
+        (f"{tree['seconds']:.2f}", f"{tree['cpu_seconds']:.2f}"),
     )
     yield Line("peak of the process, GB", (f"{tree['peak_gb']:.2f}",))
     starts = result["starts"]
     yield Line("Start", ())
-    yield Line("cold, to the end of the first year, s", (f"{starts['cold_s']:.1f}",))
+    cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
+    yield Line("cold, to the end of the first year, s", cold)
     yield Line("warm, to the end of the first year, s", (f"{starts['warm_s']:.2f}",))
     yield Line("forest --help, s", (f"{starts['help_s']:.2f}",))
 

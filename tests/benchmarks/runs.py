@@ -33,18 +33,21 @@ def grow_paper_tree(rounds: int) -> dict[str, Any]:
     for _ in range(_WARM_STEPS):
         warm.step()
     seconds = []
+    cpu = []
     for _ in range(rounds):
-        start = time.perf_counter()
+        start, cpu_start = time.perf_counter(), time.process_time()
         tree = Stand(scenario)
         internodes = 0
         while internodes < PAPER_INTERNODES and tree.steps < PAPER_STEPS:
             tree.step()
             internodes = int(tree.rows.size.sum())
         seconds.append(time.perf_counter() - start)
+        cpu.append(time.process_time() - cpu_start)
     return {
         "internodes": internodes,
         "steps": tree.steps,
         "seconds": statistics.median(seconds),
+        "cpu_seconds": statistics.median(cpu),
         "peak_gb": machine.peak_bytes() / 1e9,
     }
 
@@ -102,9 +105,10 @@ def run_hectare(overrides: Sequence[str]) -> dict[str, Any]:
             patch.object(RunWriter, "finish", writing.around(RunWriter.finish)),
             patch.object(simulation, "_checkpoint", writing.around(simulation._checkpoint)),
         ):
-            start = time.perf_counter()
+            start, cpu_start = time.perf_counter(), time.process_time()
             simulation.simulate(scenario, out, progress=census).close()
             seconds = time.perf_counter() - start
+            cpu = time.process_time() - cpu_start
         size = out.stat().st_size
     metamers, sites = count_metamers(census.stand)
     phases = sum(census.stand.seconds.values())
@@ -116,6 +120,7 @@ def run_hectare(overrides: Sequence[str]) -> dict[str, Any]:
         "metamers_with_site": sites,
         "metamer_years": census.metamer_years,
         "seconds": seconds,
+        "cpu_seconds": cpu,
         "wall_ns": 1e9 * seconds / census.metamer_years,
         "writing_share": writing.seconds / seconds,
         "phase_shares": {name: s / phases for name, s in census.stand.seconds.items()},
@@ -146,9 +151,16 @@ def time_starts(warm_rounds: int) -> dict[str, float]:
             )
             return time.perf_counter() - begun
 
+        cpu_before = _cpu_of_children()
         cold = start(first_year)
         return {
             "cold_s": cold,
+            "cold_cpu_s": _cpu_of_children() - cpu_before,
             "warm_s": statistics.median(start(first_year) for _ in range(warm_rounds)),
             "help_s": statistics.median(start(["--help"]) for _ in range(warm_rounds)),
         }
+
+
+def _cpu_of_children() -> float:
+    times = os.times()
+    return times.children_user + times.children_system

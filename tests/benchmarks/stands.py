@@ -35,6 +35,7 @@ class Saved(NamedTuple):
         """Build the stand anew."""
         stand = ClockedStand.restore(self.scenario, self.arrays, self.meta)
         assert isinstance(stand, ClockedStand)
+        stand.forget_times()
         return stand
 
 
