@@ -227,8 +227,13 @@ def _sample_year(
     parent = arena.parent[part]
     parent_serial = np.where(parent >= 0, serial[parent], -1).astype(np.int32)
     base = np.array([rows.x[row], rows.y[row], 0.0])
-    new = np.ones(n, np.bool_) if known is None else ~np.isin(serial, known)
-    lost = np.empty(0, np.int32) if known is None else np.setdiff1d(known, serial)
+    # serials rise within a tree, so what is new stands at the end and a search finds the lost
+    new = np.ones(n, np.bool_)
+    lost = np.empty(0, np.int32)
+    if known is not None and known.size:
+        new = serial > known[-1]
+        place = np.minimum(np.searchsorted(serial, known), n - 1)
+        lost = known[serial[place] != known]
     state = arena.state[part]
     exponent = float(stand.pipe_exponent[rows.species[row]])
     if dies:
