@@ -35,6 +35,7 @@ QUICK = Extent(across=(1, 3), rounds=(5, 3), run=("plot.size_m=[24, 24]", "years
 def measure(extent: Extent) -> dict[str, Any]:
     """Measure everything and give it as a dict that JSON can hold."""
     result: dict[str, Any] = {"machine": machine.describe()}
+    others = machine.Others()
     with tempfile.TemporaryDirectory() as folder:
         tile = str(Path(folder) / "tile.npz")
         _say("growing a tile", machine.alone, stands.keep_tile, tile)
@@ -51,6 +52,7 @@ def measure(extent: Extent) -> dict[str, Any]:
     )
     result["run"] = _say("a run", machine.alone, runs.run_hectare, extent.run)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
+    result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
     return result
 

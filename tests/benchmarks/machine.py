@@ -35,7 +35,6 @@ def describe() -> dict[str, Any]:
         "processor": model,
         "cores": os.cpu_count(),
         "memory_gb": os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9,
-        "load_before": os.getloadavg()[0],
         "system": platform.platform(),
         "python": platform.python_version(),
         "numpy": np.__version__,
@@ -83,6 +82,25 @@ def _status(key: str) -> int:
         if line.startswith(key + ":"):
             return int(line.split()[1]) * 1024
     raise KeyError(key)
+
+
+class Others:
+    """How much processor time other programs take while this one measures."""
+
+    def __init__(self) -> None:
+        self._begun = self._read()
+
+    def share(self) -> float:
+        """Share of all cores' time since the start that went to others; children are not others."""
+        total, busy, own = (b - a for a, b in zip(self._begun, self._read(), strict=True))
+        return max(busy - own, 0.0) / total
+
+    def _read(self) -> tuple[float, float, float]:
+        fields = Path("/proc/stat").read_text().splitlines()[0].split()[1:9]
+        ticks = [int(field) for field in fields]
+        per_second = os.sysconf("SC_CLK_TCK")
+        idle = ticks[3] + ticks[4]
+        return sum(ticks) / per_second, (sum(ticks) - idle) / per_second, sum(os.times()[:4])
 
 
 def alone(function: Callable[..., Any], *arguments: Any) -> Any:

@@ -118,7 +118,8 @@ def show(result: dict[str, Any]) -> None:
     machine = result["machine"]
     table = Table(
         title=f"{machine['processor']}, {machine['cores']} cores, "
-        f"{machine['memory_gb']:.0f} GB; load before: {machine['load_before']:.1f}",
+        f"{machine['memory_gb']:.0f} GB; "
+        f"other programs took {result['others_share']:.0%} of the time",
     )
     table.add_column("")
     for heading in HEADINGS:
@@ -142,7 +143,7 @@ def to_markdown(result: dict[str, Any]) -> str:
         f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gb']:.0f} GB; "
         f"{machine['system']}; Python {machine['python']}, NumPy {machine['numpy']}, "
         f"numba {machine['numba']}, forest {machine['forest']}; measured {result['finished']}, "
-        f"load average {machine['load_before']:.1f} before.",
+        f"while other programs took {result['others_share']:.0%} of the processors' time.",
         "",
         "| | " + " | ".join(HEADINGS) + " |",
         "|---|" + "---:|" * len(HEADINGS),
