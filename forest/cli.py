@@ -176,9 +176,7 @@ def info(run_file: RunFile) -> None:
 @app.command()
 def export(
     run_file: RunFile,
-    table: Annotated[
-        str, typer.Option(help="trees, stand, events, rings, carbon, population or steps.")
-    ],
+    table: Annotated[str, typer.Option(help="trees, stand, events, rings, carbon or population.")],
     to: Annotated[Path, typer.Option(metavar="FILE", help="File that ends in .csv or .parquet.")],
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:

@@ -341,7 +341,7 @@ class Stand:
 
     @property
     def floor_light(self) -> float:
-        """Mean relative irradiance on the ground, 0..1."""
+        """Mean relative irradiance on the ground, 0..1; NaN without a far field."""
         return self._surroundings.floor_light()
 
     @property
@@ -386,7 +386,7 @@ class Stand:
             row,
             species=self.species_names[kind],
             pipe_exponent=float(self.pipe_exponent[kind]),
-            start_year=self.scenario.start_year,
+            start_year=self.scenario.start_year - 1,
         )
 
     def row_of(self, tree_id: int) -> int:

@@ -164,3 +164,18 @@ def test_acts_before_a_checkpoint_are_in_it(stand: Stand) -> None:
     restored = Stand.restore(stand.scenario, *stand.state())
     assert_same_state(stand, restored)
     assert_same_years(steps(stand, 3), steps(restored, 3))
+
+
+def test_metamers_are_born_in_the_calendar_year_that_made_them() -> None:
+    young = Stand(tiny())
+    tree_id = int(young.rows.tree_id[0])
+    planted = young.skeleton(tree_id).birth_year
+    young.step()
+    assert list(planted) == [young.scenario.start_year - 1]
+    assert young.skeleton(tree_id).birth_year.max() == young.year
+
+
+def test_marker_space_alone_fits_any_periodic_plot() -> None:
+    young = Stand(tiny("environment={markers={}}", "plot.size_m=[6.7, 7.1]"))
+    young.step()
+    assert young.rows.size.max() > 1

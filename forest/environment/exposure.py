@@ -121,8 +121,10 @@ class Light:
         latitude_deg: float = 50.0,
         obstacles: Sequence[Box | Mesh] = (),
     ) -> None:
+        # A torus wraps at whole voxels; without fields and solids nothing is looked up in them.
+        fits = periodic and bool(shadow or canopy or obstacles)
         nx, ny = (
-            whole_voxels(size_m[i], voxel_m, exact=periodic, what=f"plot size along {'xy'[i]}")
+            whole_voxels(size_m[i], voxel_m, exact=fits, what=f"plot size along {'xy'[i]}")
             for i in range(2)
         )
         self._shape = (nx, ny)
@@ -275,5 +277,5 @@ class Light:
         )
 
     def floor_light(self) -> float:
-        """Mean relative irradiance at the ground of the plot, 0 to 1; 1 without a far field."""
-        return self._canopy.floor_light() if self._canopy else 1.0
+        """Mean relative irradiance at the ground of the plot, 0 to 1; NaN without a far field."""
+        return self._canopy.floor_light() if self._canopy else float("nan")

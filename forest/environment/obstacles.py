@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,10 @@ from numpy.typing import NDArray
 from forest._jit import inline
 from forest.environment.canopy import CanopyField
 from forest.errors import InputError
+
+#: Voxels that all obstacles together may be made of, and those of the mask that holds them.
+_MOST_SOLID = 20_000_000
+_MOST_MASK = 500_000_000
 
 
 @dataclass(frozen=True)
@@ -108,12 +113,19 @@ def voxelise(
     Raises
     ------
     InputError
-        If a mesh cannot be read, is not closed, or holds no voxel.
+        If a mesh cannot be read, is not closed, or holds no voxel; if obstacles are too large or
+        too far away for the voxels' size.
     """
-    parts = [
-        _box_voxels(o, voxel_m) if isinstance(o, Box) else _mesh_voxels(o, voxel_m)
-        for o in obstacles
-    ]
+    parts = []
+    left = _MOST_SOLID
+    for o in obstacles:
+        surface = None if isinstance(o, Box) else _closed_surface(o)
+        axes = _box_axes(o, voxel_m) if isinstance(o, Box) else _bounding_axes(surface, voxel_m)
+        left -= math.prod(len(axis) for axis in axes)
+        if left < 0:
+            raise _too_large(voxel_m)
+        voxels = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        parts.append(voxels if isinstance(o, Box) else _within(o, surface, voxels, voxel_m))
     voxels = np.concatenate(parts) if parts else np.zeros((0, 3), np.int64)
     voxels = voxels[voxels[:, 2] >= 0]
     if len(voxels) == 0:
@@ -128,13 +140,26 @@ def voxelise(
         low = voxels.min(axis=0)
         # One layer more than needed, since a mask of one voxel stands for no obstacle.
         high = voxels.max(axis=0) + np.array([1, 1, 2])
+    # The far field spans the plot and all obstacles.
+    spanned = np.maximum(high, [nx, ny, 1]) - np.minimum(low, 0)
+    if math.prod(int(n) for n in spanned) > _MOST_MASK:
+        raise _too_large(voxel_m)
     mask = np.zeros(tuple((high - low)[::-1]), np.uint8)
     x, y, z = (voxels - low).T
     mask[z, y, x] = 1
     return Solid(mask, low.astype(np.int32), int(periodic), np.array(shape, np.int64))
 
 
-def _box_voxels(box: Box, voxel_m: float) -> NDArray[np.int64]:
+def _too_large(voxel_m: float) -> InputError:
+    return InputError(
+        f"too large or too far away for voxels of {voxel_m:g} m",
+        where="obstacles",
+        expected=f"at most {_MOST_SOLID:,} voxels, within {_MOST_MASK:,} around the plot",
+    )
+
+
+def _box_axes(box: Box, voxel_m: float) -> list[NDArray[np.int64]]:
+    """List the voxels that a box fills along each axis."""
     axes = []
     for low, high in zip(box.min_m, box.max_m, strict=True):
         first = int(np.rint(low / voxel_m))
@@ -143,10 +168,10 @@ def _box_voxels(box: Box, voxel_m: float) -> NDArray[np.int64]:
             first = int(np.floor((low + high) / 2 / voxel_m))
             last = first + 1
         axes.append(np.arange(first, last, dtype=np.int64))
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return axes
 
 
-def _mesh_voxels(mesh: Mesh, voxel_m: float) -> NDArray[np.int64]:
+def _closed_surface(mesh: Mesh) -> Any:
     import pyvista
 
     try:
@@ -159,9 +184,24 @@ def _mesh_voxels(mesh: Mesh, voxel_m: float) -> NDArray[np.int64]:
         raise InputError(
             "the mesh is not closed", where=str(mesh.file), expected="a watertight surface"
         )
-    bounds = np.asarray(surface.bounds).reshape(3, 2)
-    axes = [np.arange(np.floor(a / voxel_m), np.ceil(b / voxel_m)) for a, b in bounds]
-    voxels = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return surface
+
+
+def _bounding_axes(surface: Any, voxel_m: float) -> list[NDArray[np.int64]]:
+    """List the voxels that a surface may fill along each axis."""
+    bounds = np.asarray(surface.bounds).reshape(3, 2) / voxel_m
+    # More than all obstacles may hold is as good as endless.
+    first = np.clip(np.floor(bounds[:, 0]), -_MOST_SOLID, _MOST_SOLID).astype(np.int64)
+    last = np.clip(np.ceil(bounds[:, 1]), -_MOST_SOLID, _MOST_SOLID).astype(np.int64)
+    return [np.arange(a, b, dtype=np.int64) for a, b in zip(first, last, strict=True)]
+
+
+def _within(
+    mesh: Mesh, surface: Any, voxels: NDArray[np.int64], voxel_m: float
+) -> NDArray[np.int64]:
+    """Keep the voxels whose centres a surface encloses."""
+    import pyvista
+
     centres = pyvista.PolyData((voxels + 0.5) * voxel_m)
     inside = np.asarray(centres.select_interior_points(surface)["selected_points"], bool)
     if not inside.any():

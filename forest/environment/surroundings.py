@@ -121,7 +121,7 @@ class Surroundings:
         return self._light.directions(trees.species[row], voxel, heading)
 
     def floor_light(self) -> float:
-        """Mean relative irradiance at the ground, 0..1."""
+        """Mean relative irradiance at the ground, 0..1; NaN without a far field."""
         return self._light.floor_light()
 
     def state(self) -> dict[str, NDArray[Any]]:

@@ -222,7 +222,7 @@ class Scenario(Table):
             spots.take(tree.x_m, tree.y_m, i)
 
     @model_validator(mode="after")
-    def _samples_in_time(self) -> Scenario:
+    def _samples_exist(self) -> Scenario:
         samples = self.output.sample_trees
         last = self.start_year + self.years - 1
         if samples.at_year is None:
@@ -234,7 +234,25 @@ class Scenario(Table):
                 key="output.sample_trees.at_year",
                 expected=f"a calendar year, {self.start_year} to {last}",
             )
+        planted = self._count_trees()
+        for tree_id in samples.ids:
+            if tree_id > planted:
+                raise Refusal(
+                    f"no tree {tree_id} is planted",
+                    key="output.sample_trees.ids",
+                    expected=f"1 to {planted}",
+                )
         return self
+
+    def _count_trees(self) -> int:
+        planting, size = self.planting, self.plot.size_m
+        if isinstance(planting, Explicit):
+            return len(planting.trees)
+        if isinstance(planting, Random):
+            return placing.random_count(size, planting.density_ha, planting.min_distance_m)
+        if isinstance(planting, Regular):
+            return len(placing.regular_spots(size, planting.spacing_m)[0])
+        raise TypeError(planting)  # a stem map has become explicit when the scenario was read
 
     # --- use -------------------------------------------------------------------------------
 

@@ -24,6 +24,9 @@ def _ascending(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, fl
 _Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
 #: A piecewise linear curve: points (x, y), x ascending; constant beyond its ends; empty = off.
 Curve = Annotated[tuple[tuple[_Coordinate, _Coordinate], ...], AfterValidator(_ascending)]
+_Factor = Annotated[float, Field(ge=0.05, le=20)]
+#: A curve of factors that must not vanish.
+FactorCurve = Annotated[tuple[tuple[_Coordinate, _Factor], ...], AfterValidator(_ascending)]
 Direction = tuple[
     Annotated[float, Field(ge=-1, le=1)],
     Annotated[float, Field(ge=-1, le=1)],
@@ -45,7 +48,7 @@ class Architecture(Table):
         137.5, "turn around the axis from one lateral bud to the next", unit="degree", ge=0, le=360
     )
     angle_jitter_deg: float = quantity(
-        5.0, "standard deviation of both angles", unit="degree", ge=0, le=45
+        5.0, "largest deviation of both angles, all alike likely", unit="degree", ge=0, le=45
     )
     max_metamers_per_shoot: int = quantity(
         4, "most metamers that a bud makes in a year", ge=1, le=60
@@ -59,7 +62,7 @@ class Architecture(Table):
         "the terminal bud goes on (monopodial) or flowers and dies (sympodial)",
         unit="",
     )
-    internode_factor_by_order: Curve = quantity(
+    internode_factor_by_order: FactorCurve = quantity(
         (), "factor of the internode length by order (Taylor-Hell 2005, 3.1)"
     )
     shoots_by_height_in_year: Curve = quantity(
@@ -67,7 +70,7 @@ class Architecture(Table):
     )
     shoots_by_order: Curve = quantity((), "f2: a bud's readiness by order (Taylor-Hell 2005, 3.1)")
     shoots_by_parent_length: Curve = quantity(
-        (), "f3: a bud's readiness by the parent shoot's length in m (Taylor-Hell 2005, 3.1)"
+        (), "f3: a bud's readiness by the parent internode's length in m (Taylor-Hell 2005, 3.1)"
     )
 
 
@@ -89,8 +92,8 @@ class BudFate(Table):
     )
     apical_control_until_age_years: tuple[_Years, ...] = quantity(
         (),
-        "age of an axis at which apical control ends, by order; the last entry holds for all "
-        "higher orders; empty = it never ends",
+        "age of the tree at which apical control of its axes ends, by their order; the last entry "
+        "holds for all higher orders; empty = it never ends",
         unit="year",
         max_length=256,
     )

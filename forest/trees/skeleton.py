@@ -98,7 +98,7 @@ def skeleton_of(
     pipe_exponent : float
         n of its pipe model: diameter = pipe^(1/n).
     start_year : int
-        Calendar year of step 0, from which `birth` is counted.
+        Calendar year of step 0, the one before the first, from which `birth` is counted.
     """
     here = slice(int(trees.start[row]), int(trees.start[row]) + int(trees.size[row]))
     parent = metamers.parent[here].copy()

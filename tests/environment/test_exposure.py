@@ -199,6 +199,13 @@ def test_no_trees_and_bare_trees():
         assert light.floor_light() == pytest.approx(1.0, abs=1e-6)
 
 
+def test_the_floor_is_not_known_without_a_far_field():
+    metamers, trees = make_stand(3, 2, 4)
+    light = make_light(canopy=None)
+    light.expose(metamers, trees)
+    assert np.isnan(light.floor_light())
+
+
 def test_roof_darkens_what_is_under_it():
     roof = Box((0.0, 0.0, 3.0), (4.0, 3.0, 3.5))
     metamers, trees = make_stand(1, 1, 1)

@@ -75,3 +75,16 @@ def test_open_or_unreadable_mesh_is_refused(tmp_path):
         voxelise([Mesh(file)], (20, 20), periodic=False, voxel_m=0.2)
     with pytest.raises(InputError, match="cannot read"):
         voxelise([Mesh(tmp_path / "none.stl")], (20, 20), periodic=False, voxel_m=0.2)
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        Box((-3000.0, -3000.0, 0.0), (3000.0, 3000.0, 100.0)),
+        Box((90_000.0, 90_000.0, 0.0), (90_001.0, 90_001.0, 1.0)),
+    ],
+    ids=["large", "far"],
+)
+def test_obstacles_that_fit_no_memory_are_refused(box):
+    with pytest.raises(InputError, match=r"^obstacles: too large or too far away"):
+        voxelise([box], (20, 20), periodic=False, voxel_m=0.2)

@@ -117,6 +117,12 @@ def test_the_text_is_right_before_it_is_spoilt(tmp_path: Path) -> None:
         ('"map.csv"', '"map.csv"\nspecies = "pine"', ["planting.species: unknown species 'pine'"]),
         ("[0.5]", "[1.5]", ["output.sample_trees.dbh_quantiles[0]: 1.5", "0 to 1"]),
         ("[0.5]", "[0.5]\nat_year = 2010", ["at_year: 2010", "2000 to 2009"]),
+        ("[0.5]", "[0.5]\nids = [1, 3]", ["sample_trees.ids: no tree 3", "expected 1 to 2"]),
+        (
+            "[species.picea_abies]",
+            "[species.picea_abies.architecture]\ninternode_factor_by_order = [[0, 1], [2, 0]]",
+            ["species.picea_abies.architecture.internode_factor_by_order[1][1]: 0", "0.05"],
+        ),
         (
             'kind = "stem_map"\nfile = "map.csv"',
             'kind = "explicit"\ntrees = [{x_m = 1, y_m = 1}]',
