@@ -13,6 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+# Threads that wait must not spin: where other programs use the cores, spinning made two threads
+# seven times slower than one. This must be set before numba loads its threads.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
 import numba
 from numba.core import config
 

@@ -113,6 +113,9 @@ class Stand:
             self._traits,
             year,
             accounts,
+            self._paper or None,
+            self.scenario.growth.bud_fate == "priority" or None,
+            self.scenario.growth.balance or None,
         )
         self._lap("allocate")
 
@@ -198,8 +201,6 @@ class Stand:
             income_factor=factor * s.site.productivity,
             full_light=self._full_light,
             paper=self._paper,
-            priority=s.growth.bud_fate == "priority",
-            balance=s.growth.balance,
         )
 
     def _lap(self, phase: str) -> None:

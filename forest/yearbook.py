@@ -95,7 +95,8 @@ def record_year(
     alive = np.ones(len(rows.tree_id), np.bool_)
     alive[[row for row, _ in dead]] = False
     living = table.keep(rows, alive)
-    of_living = TreeMeasures(*(column[alive] for column in measures))
+    kept: dict[str, Any] = {name: column[alive] for name, column in measures._asdict().items()}
+    of_living = TreeMeasures(**kept)
     events = [
         *stand.pending,
         *(Event.of(stand, row, "died", cause, measures) for row, cause in dead),
@@ -216,9 +217,7 @@ def _sample_years(
     return years
 
 
-def _sample_year(
-    stand: Stand, row: int, known: NDArray[np.int32] | None, dies: bool
-) -> SampleYear:
+def _sample_year(stand: Stand, row: int, known: NDArray[np.int32] | None, dies: bool) -> SampleYear:
     rows = stand.rows
     start, n = int(rows.start[row]), int(rows.size[row])
     part = slice(start, start + n)

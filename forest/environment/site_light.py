@@ -18,7 +18,7 @@ from forest.environment.light_grid import ShadowField, place_in, window_of
 from forest.environment.voxels import HANDS, count_buds, site_voxel, wrap
 
 #: The plot's rows are cut into this many slabs; each is filled by one thread.
-SLABS = 16
+SLABS = 4
 
 
 class Units(NamedTuple):

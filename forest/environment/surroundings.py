@@ -108,7 +108,7 @@ class Surroundings:
     def directions(
         self, metamers: Metamers, trees: Trees, shoots: Shoots, heading: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Give the optimal direction V of each shooting bud (float32 (n, 3)); zero if there is none."""
+        """Give the optimal direction V of each shooting bud, float32 (n, 3); zero without one."""
         n_trees = len(trees.tree_id)
         row = np.repeat(np.arange(n_trees), np.diff(shoots.first))
         if self._space is not None:
@@ -143,7 +143,8 @@ def _key(
     tree_id: NDArray[np.int32], serial: NDArray[np.int32], bud: NDArray[np.uint8]
 ) -> NDArray[np.int64]:
     """Name a bud by one number that rises with tree, metamer and bud."""
-    return (tree_id.astype(np.int64) << 32) + (serial.astype(np.int64) << 1) + bud
+    key = (tree_id.astype(np.int64) << 32) + (serial.astype(np.int64) << 1)
+    return key + bud.astype(np.int64)
 
 
 def _by_serial(

@@ -64,13 +64,20 @@ def unit_costs(traits, sp):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-untyped-def]
-    """Share v_base among the buds by the scenario's bud-fate model."""
+def _share(t, sp, age, parts, v_base, priority, balance, work, ints):  # type: ignore[no-untyped-def]
+    """Share v_base among the buds by the scenario's bud-fate model.
+
+    `priority` and `balance` are True or None: numba compiles no branch that hangs on a None.
+    """
     parent, state, order, tip, length, pipe, light = parts
     n = len(parent)
     q_main, q_side, v_main, v_side = work[0], work[1], work[2], work[3]
     weights = work[6:8]
-    if year.balance:
+    if balance is None:
+        for i in range(n):
+            weights[0, i] = 1.0
+            weights[1, i] = 1.0
+    else:
         traits = (
             t.of[sp].density,
             t.of[sp].min_growth,
@@ -82,12 +89,24 @@ def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-unty
         growth_shares(
             parent, state, tip, length, pipe, light, traits, weights, work[8:11], ints[0:2]
         )
-    else:
-        for i in range(n):
-            weights[0, i] = 1.0
-            weights[1, i] = 1.0
     control = np.empty(MAX_ORDERS)
-    if year.priority:
+    if priority is None:
+        for o in range(MAX_ORDERS):
+            control[o] = t.of[sp].apical_bias if age < t.apical_until[sp, o] else 0.5
+        share_borchert_honda(
+            parent,
+            state,
+            order,
+            q_main,
+            q_side,
+            weights,
+            control,
+            t.of[sp].max_order,
+            v_base,
+            v_main,
+            v_side,
+        )
+    else:
         for o in range(MAX_ORDERS):
             control[o] = 1.0 if age < t.apical_until[sp, o] else 0.0
         share_priority(
@@ -104,22 +123,6 @@ def _share(t, sp, age, year, parts, v_base, work, ints):  # type: ignore[no-unty
             v_main,
             v_side,
             ints,
-        )
-    else:
-        for o in range(MAX_ORDERS):
-            control[o] = t.of[sp].apical_bias if age < t.apical_until[sp, o] else 0.5
-        share_borchert_honda(
-            parent,
-            state,
-            order,
-            q_main,
-            q_side,
-            weights,
-            control,
-            t.of[sp].max_order,
-            v_base,
-            v_main,
-            v_side,
         )
 
 
@@ -160,7 +163,7 @@ def _hold_back(arena, s, e, t, sp, year, tree_id):  # type: ignore[no-untyped-de
 
 
 @njit
-def _allocate_paper(arena, trees, row, t, year, work, ints):  # type: ignore[no-untyped-def]
+def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints):  # type: ignore[no-untyped-def]
     """Palubicki 4.2: v_base = alpha Q_base."""
     s = trees.start[row]
     n = trees.size[row]
@@ -177,7 +180,7 @@ def _allocate_paper(arena, trees, row, t, year, work, ints):  # type: ignore[no-
     )
     q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
     age = np.float64(year.step - trees.birth[row])
-    _share(t, sp, age, year, parts, t.of[sp].alpha * q_base, work, ints)
+    _share(t, sp, age, parts, t.of[sp].alpha * q_base, priority, balance, work, ints)
     for i in range(n):
         arena.resource[s + i, 0] = work[2, i] if arena.state[s + i] & _TERMINAL else 0.0
         arena.resource[s + i, 1] = work[3, i] if arena.state[s + i] & _LATERAL else 0.0
@@ -226,7 +229,7 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
 
 
 @njit
-def _allocate_balanced(arena, trees, row, t, year, accounts, work, ints):  # type: ignore[no-untyped-def]
+def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, work, ints):  # type: ignore[no-untyped-def]
     """The annual mass balance of one tree: income, costs, spend, and what buds may make."""
     s = trees.start[row]
     n = trees.size[row]
@@ -260,7 +263,8 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, work, ints):  # typ
 
     q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
     age = np.float64(year.step - trees.birth[row])
-    _share(t, sp, age, year, parts, t.of[sp].alpha * q_base / year.full_light, work, ints)
+    v_base = t.of[sp].alpha * q_base / year.full_light
+    _share(t, sp, age, parts, v_base, priority, balance, work, ints)
     for i in range(n):
         if not arena.state[s + i] & _TERMINAL:
             work[2, i] = 0.0
@@ -296,8 +300,14 @@ def allocate(
     traits: SpeciesTraits,
     year: Year,
     accounts,
+    paper,
+    priority,
+    balance,
 ):  # type: ignore[no-untyped-def]
     """Allocate the year's resource in every tree.
+
+    `paper`, `priority` and `balance` are True, or None for the mass balance, the Borchert-Honda
+    model and no balance; what hangs on a None is not compiled.
 
     Sets `arena.resource` (v of each bud; in mass-balance mode with the carried fraction) and, in
     mass-balance mode, books income, leaves, upkeep and spend in `accounts` (trees, ACCOUNTS).
@@ -310,7 +320,9 @@ def allocate(
             g = shared.place[b] * INTEGERS
             work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
             ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
-            if year.paper:
-                _allocate_paper(arena, trees, row, traits, year, work, ints)
+            if paper is None:
+                _allocate_balanced(
+                    arena, trees, row, traits, year, accounts, priority, balance, work, ints
+                )
             else:
-                _allocate_balanced(arena, trees, row, traits, year, accounts, work, ints)
+                _allocate_paper(arena, trees, row, traits, year, priority, balance, work, ints)

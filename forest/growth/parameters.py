@@ -111,8 +111,6 @@ class Year(NamedTuple):
     income_factor: float
     full_light: float
     paper: bool
-    priority: bool
-    balance: bool
 
 
 def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:

@@ -9,9 +9,7 @@ from forest.trees.metamers import BRANCHED, CONTINUED, MAIN, Metamers
 from forest.trees.table import Trees
 
 
-def cut_branch(
-    arena: Metamers, trees: Trees, row: int, serial: int, branch_pipe: float
-) -> int:
+def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int, branch_pipe: float) -> int:
     """Remove a metamer and everything it carries, and close the gap in the tree's extent.
 
     Parameters

@@ -61,9 +61,16 @@ def empty(n: int = 0) -> Trees:
 
 def append(trees: Trees, more: Trees) -> Trees:
     """Give a table with the rows of `more` behind those of `trees`."""
-    return Trees(*(np.concatenate((a, b)) for a, b in zip(trees, more, strict=True)))
+    columns: dict[str, Any] = {
+        name: np.concatenate((column, getattr(more, name)))
+        for name, column in trees._asdict().items()
+    }
+    return Trees(**columns)
 
 
 def keep(trees: Trees, rows: NDArray[np.bool_]) -> Trees:
     """Give a table of the rows for which `rows` is true."""
-    return Trees(*(np.ascontiguousarray(column[rows]) for column in trees))
+    columns: dict[str, Any] = {
+        name: np.ascontiguousarray(column[rows]) for name, column in trees._asdict().items()
+    }
+    return Trees(**columns)

@@ -44,8 +44,6 @@ def make_year(step: int = 5, **changes: Any) -> Year:
         income_factor=1.0,
         full_light=1.0,
         paper=False,
-        priority=False,
-        balance=False,
     )
     return year._replace(**changes)
 
@@ -103,14 +101,23 @@ def grow_shoots(
     return shoots
 
 
-def grow_year(arena: Arena, trees: Trees, traits: SpeciesTraits, year: Year) -> NDArray[np.float64]:
+def grow_year(
+    arena: Arena,
+    trees: Trees,
+    traits: SpeciesTraits,
+    year: Year,
+    *,
+    priority: bool = False,
+    balance: bool = False,
+) -> NDArray[np.float64]:
     """Grow all trees for a year under made-up light; give their accounts."""
     bench = Workbench()
     accounts = np.zeros((len(trees.tree_id), ACCOUNTS))
     light_everything(arena.metamers, trees, year.step)
     shared = deal(trees.size)
     scratch = bench.scratch(shared)
-    allocate(arena.metamers, trees, shared, scratch, traits, year, accounts)
+    models = (year.paper or None, priority or None, balance or None)
+    allocate(arena.metamers, trees, shared, scratch, traits, year, accounts, *models)
     shed(arena.metamers, trees, shared, scratch, traits, not year.paper)
     grow_shoots(arena, trees, traits, year, no_solid(), pull=True)
     shared = deal(trees.size)

@@ -103,7 +103,8 @@ def test_bins_of_thresholds(s: float) -> None:
 def _allocated(m, trees, traits, year):  # type: ignore[no-untyped-def]
     accounts = np.zeros((len(trees.tree_id), ACCOUNTS))
     shared = deal(trees.size)
-    allocate(m, trees, shared, Workbench().scratch(shared), traits, year, accounts)
+    scratch = Workbench().scratch(shared)
+    allocate(m, trees, shared, scratch, traits, year, accounts, None, None, None)
     return accounts
 
 

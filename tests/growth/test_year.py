@@ -36,9 +36,9 @@ SPECIES = (
     make_species(architecture={"ramification": "sylleptic"}, bud_fate={"alpha": 2.5}),
 )
 MODES = {
-    "balance": make_year(balance=True),
-    "priority": make_year(priority=True),
-    "paper": make_year(paper=True),
+    "balance": (make_year(), {"balance": True}),
+    "priority": (make_year(), {"priority": True}),
+    "paper": (make_year(paper=True), {}),
 }
 
 
@@ -53,8 +53,9 @@ def _stand(seed: int) -> tuple[Metamers, Trees]:
 
 def _grow(arena: Arena, trees: Trees, mode: str, years: int) -> list[np.ndarray]:
     traits = make_traits(*SPECIES, paper=mode == "paper")
+    year, models = MODES[mode]
     return [
-        grow_year(arena, trees, traits, MODES[mode]._replace(step=step))
+        grow_year(arena, trees, traits, year._replace(step=step), **models)
         for step in range(FIRST, FIRST + years)
     ]
 
@@ -78,7 +79,8 @@ def test_the_contract_holds(mode: str, seed: int) -> None:
         ]
         reserve = trees.reserve.copy()
         traits = make_traits(*SPECIES, paper=mode == "paper")
-        accounts = grow_year(arena, trees, traits, MODES[mode]._replace(step=step))
+        year, models = MODES[mode]
+        accounts = grow_year(arena, trees, traits, year._replace(step=step), **models)
         assert_valid(arena.metamers, trees)
         for row in range(6):
             here = extent(trees, row)
