@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import math
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from typing import Any
 
 from forest.errors import InputError
 from forest.species.schema import Refusal
-from forest.species.text import read_text
+from forest.species.text import read_bytes, read_text
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".vtp")
 _LIMIT_M = 1e5
@@ -120,3 +121,11 @@ def find_mesh(file: str, context: Any) -> str:
     if not there:
         raise Refusal(f"no such file {str(path)!r}", expected="a mesh file")
     return str(path.absolute())
+
+
+def digest(file: str) -> str:
+    """Hash a file's contents: SHA-256, in hexadecimal."""
+    try:
+        return hashlib.sha256(read_bytes(Path(file), where="")).hexdigest()
+    except InputError as error:
+        raise Refusal(str(error)) from None

@@ -255,11 +255,24 @@ class Mesh(Table):
     file: str = quantity(
         ..., "surface file (.stl, .obj, .ply or .vtp); relative to the scenario", unit=""
     )
+    sha256: str = quantity("", "hash of the file; filled in when the scenario is read", unit="")
 
     @field_validator("file")
     @classmethod
     def _exists(cls, file: str, info: ValidationInfo) -> str:
         return files.find_mesh(file, info.context)
+
+    @field_validator("sha256")
+    @classmethod
+    def _is_the_same(cls, digest: str, info: ValidationInfo) -> str:
+        if "file" not in info.data:
+            return digest  # refused for its file
+        found = files.digest(info.data["file"])
+        if digest not in ("", found):
+            raise Refusal(
+                f"{info.data['file']!r} has changed", expected="the mesh that the scenario had"
+            )
+        return found
 
 
 Obstacle = Annotated[Box | Mesh, Field(discriminator="kind")]

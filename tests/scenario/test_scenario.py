@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from forest.errors import InputError
 from forest.scenario import Scenario, describe
 from forest.species import load_species
 
@@ -147,3 +148,15 @@ def test_describe_lists_every_top_level_key() -> None:
     assert rows["environment.shadow.b"].range == "above 1, at most 100"
     assert rows["planting(random).density_ha"].unit == "1/ha"
     assert "species.<name>.carbon.sapwood_years" in rows
+
+
+def test_a_mesh_that_has_changed_makes_another_scenario(tmp_path: Path) -> None:
+    mesh = tmp_path / "rock.stl"
+    mesh.write_text("solid one")
+    obstacles = [{"kind": "mesh", "file": str(mesh)}]
+    first = small(obstacles=obstacles)
+    assert Scenario.from_toml(first.to_toml()) == first
+    mesh.write_text("solid two")
+    assert small(obstacles=obstacles) != first
+    with pytest.raises(InputError, match=r"obstacles\[0\]\.sha256: .* has changed"):
+        Scenario.from_toml(first.to_toml())
