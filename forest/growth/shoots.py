@@ -317,8 +317,8 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
                 t.curve_n, t.curve_x, t.curve_y, sp, LENGTH_BY_ORDER, np.float64(order)
             )
             if year.paper and t.of[sp].sylleptic == 0.0:
-                # l = v / n (4.2); a shoot cut off at its maximum is no longer for it
-                unit *= min(v, n + 1.0) / n
+                # l = v / n (4.2); only a shoot cut off at its maximum could get longer internodes
+                unit *= min(v / n, 2.0)
             hx, hy, hz = bud_heading(arena, s, p, bud)
             arena.resource[s + p, bud] = 0.0
             made = 0

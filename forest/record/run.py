@@ -16,7 +16,7 @@ from forest.errors import InputError, nearest
 from forest.record.identity import check_identity, check_run_file, damage_reported
 from forest.record.journal import JournaledFile
 from forest.record.schema import ALL_TABLES
-from forest.trees.skeleton import Skeleton
+from forest.trees.skeleton import Skeleton, number_axes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -301,7 +301,7 @@ class Run:
             start=start,
             end=end,
             radius=group["radii/radius_m"][first:last].astype(np.float64),
-            axis=_axes(parent, metamers["main"][rows] != 0),
+            axis=number_axes(parent, metamers["main"][rows] != 0),
             order=metamers["order"][rows].astype(np.int32),
             birth_year=metamers["birth_year"][rows],
             leafy=group["radii/leafy"][first:last] != 0,
@@ -327,13 +327,3 @@ def _places(serials: NDArray[np.int32], wanted: NDArray[np.int32]) -> NDArray[np
     place = np.searchsorted(serials, wanted, sorter=order)
     found = order[np.minimum(place, len(serials) - 1)]
     return np.where(wanted >= 0, found, -1).astype(np.int32)
-
-
-def _axes(parent: NDArray[np.int32], continues: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Number the axes: 0 for the trunk, then in the order in which they start."""
-    starts = ~continues | (parent < 0)
-    first = np.where(starts, np.arange(len(parent)), parent)
-    while not starts[first].all():  # each round doubles the step towards the start of the axis
-        first = first[first]
-    number = np.cumsum(starts, dtype=np.int32) - 1
-    return number[first].astype(np.int32)

@@ -61,8 +61,11 @@ class Skeleton:
         return np.asarray(np.linalg.norm(self.end - self.start, axis=1), dtype=np.float64)
 
 
-def _number_axes(parent: NDArray[np.int32], main: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Number the axes in order of their first metamer; the base starts axis 0."""
+def number_axes(parent: NDArray[np.int32], main: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Number the axes in order of their first metamer; the base starts axis 0.
+
+    `main` tells which metamers continue their parent's axis.
+    """
     starts = ~main
     starts[:1] = True
     index = np.arange(len(parent))
@@ -112,7 +115,7 @@ def skeleton_of(
         start=start,
         end=end,
         radius=0.5 * metamers.pipe[here].astype(np.float64) ** (1.0 / pipe_exponent),
-        axis=_number_axes(parent, (state & MAIN) != 0),
+        axis=number_axes(parent, (state & MAIN) != 0),
         order=metamers.order[here].astype(np.int32),
         birth_year=start_year + metamers.birth[here].astype(np.int32),
         leafy=(state & (TERMINAL | LATERAL)) != 0,

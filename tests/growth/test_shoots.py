@@ -118,8 +118,7 @@ def test_directions_and_lengths(
     )
     assert len(m.serial) == 1 + len(tips)
     np.testing.assert_allclose(m.tip[1:], tips, rtol=1e-4, atol=2e-6)
-    whole = min(v, len(tips) + 1.0)
-    np.testing.assert_allclose(m.length[1:], 0.2 * whole / len(tips), rtol=1e-5)
+    np.testing.assert_allclose(m.length[1:], 0.2 * v / len(tips), rtol=1e-5)
     assert (m.order[1:] == (1 if lateral else 0)).all()
     assert (m.birth[1:] == 1).all()
     assert m.parent.tolist() == [-1, *range(len(tips))]

@@ -26,7 +26,6 @@ def shoot_tips(
 ) -> list[Vector]:
     """Tips of the metamers that a bud makes of v: n = floor(v), l = v / n, each bent anew."""
     n = min(int(v), most)
-    v = min(v, n + 1.0)  # a shoot cut off at its maximum is no longer than the paper's l allows
     tips = []
     for _ in range(n):
         heading = unit(heading + xi * toward + eta * tropism)
