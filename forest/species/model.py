@@ -95,7 +95,7 @@ class BudFate(Table):
         "age of the tree at which apical control of its axes ends, by their order; the last entry "
         "holds for all higher orders; empty = it never ends",
         unit="year",
-        max_length=256,
+        max_length=8,
     )
 
 

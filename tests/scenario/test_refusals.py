@@ -110,6 +110,11 @@ def test_the_text_is_right_before_it_is_spoilt(tmp_path: Path) -> None:
             "[species.picea_abies.shoots]\ntropism_direction = [0, 0, 0]",
             ["shoots.tropism_direction"],
         ),
+        (
+            "[species.picea_abies]",
+            f"[species.picea_abies.bud_fate]\napical_control_until_age_years = {[5] * 9}",
+            ["bud_fate.apical_control_until_age_years", "at most 8"],
+        ),
         ("stem_map", "stemmap", ["unknown kind 'stemmap'", '"stem_map"']),
         ('kind = "stem_map"', "", ["missing key 'kind'"]),
         ("map.csv", "mop.csv", ["planting.file: no such file"]),
