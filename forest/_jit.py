@@ -10,6 +10,7 @@ import hashlib
 import os
 import shutil
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,6 +20,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numba
 from numba.core import config
+from numba.core.event import Event, Listener, install_listener
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -57,9 +59,26 @@ CACHE = _choose_cache()
 config.CACHE_DIR = str(CACHE)
 
 
-def is_cold() -> bool:
-    """Tell whether no kernel of this version has been compiled on this machine yet."""
-    return not any(CACHE.rglob("*.nbi"))
+class _Announcer(Listener):  # type: ignore[misc]
+    """Tells once that something is being compiled."""
+
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell: Callable[[], None] | None = tell
+
+    def on_start(self, event: Event) -> None:
+        """Take the start of a compilation; what comes from the cache does not start one."""
+        if self._tell is not None:
+            tell, self._tell = self._tell, None
+            tell()
+
+    def on_end(self, event: Event) -> None:
+        """Take no notice."""
+
+
+def announce_compiling(tell: Callable[[], None]) -> AbstractContextManager[None]:
+    """Call `tell` once if a kernel has to be compiled while the context is open."""
+    context: AbstractContextManager[None] = install_listener("numba:compile", _Announcer(tell))
+    return context
 
 
 def njit(function: F) -> F:

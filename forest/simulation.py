@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from forest._jit import is_cold
+from forest._jit import announce_compiling
 from forest.errors import InputError
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
@@ -96,9 +96,11 @@ def simulate(
     else:
         checkpoint = None
         check_target(out, overwrite=overwrite)
-    with _threads(threads) as count:
-        if is_cold():
-            observer.say("compiling the kernels for the first run on this machine (about a minute)")
+
+    def compiling() -> None:
+        observer.say("compiling kernels that this machine has not run yet (up to a minute)")
+
+    with _threads(threads) as count, announce_compiling(compiling):
         # The stand comes before the file: if it cannot be built, the file is left as it was.
         if checkpoint is None:
             stand = Stand(scenario)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numba
 import pandas as pd
 import pytest
 from typer.main import get_command
@@ -110,12 +113,28 @@ def test_resume_of_a_finished_run_says_so(folder: Path) -> None:
     assert "holds 8 years" in out
 
 
-def test_first_run_says_that_kernels_are_compiled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("forest.simulation.is_cold", lambda: True)
+def test_a_run_that_has_to_compile_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    @contextmanager
+    def compiles(tell: Callable[[], None]) -> Iterator[None]:
+        tell()
+        yield
+
+    monkeypatch.setattr("forest.simulation.announce_compiling", compiles)
     words = "run", write_tiny(tmp_path), "--years", "1", "--out", tmp_path / "x.h5"
-    assert "compiling the kernels" in forest(*words)[2].splitlines()[0]
+    assert "compiling kernels" in forest(*words)[2].splitlines()[0]
+
+
+def test_compiling_is_announced_once() -> None:
+    from forest._jit import announce_compiling
+
+    told: list[bool] = []
+    with announce_compiling(lambda: told.append(True)):
+        add = numba.njit(lambda x: x + 1)
+        assert (add(1), add(1.5)) == (2, 2.5)
+    assert told == [True]
+    with announce_compiling(lambda: told.append(True)):
+        assert add(2) == 3
+    assert told == [True]
 
 
 def test_stopped_run_says_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,11 +35,8 @@ from forest.growth.parameters import (
     Year,
 )
 from forest.random import STREAM_ABORT, STREAM_FATE
-from forest.trees.metamers import Metamers
+from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
-
-_TERMINAL = 2
-_LATERAL = 4
 
 
 @njit
@@ -153,7 +150,7 @@ def _hold_back(arena, s, e, t, sp, year, tree_id):  # type: ignore[no-untyped-de
     """Let the user-drawn curves keep lateral buds from shooting this year."""
     for i in range(s, e):
         v = arena.resource[i, 1]
-        if v < 1.0 or not arena.state[i] & _LATERAL:
+        if v < 1.0 or not arena.state[i] & LATERAL:
             continue
         order = np.int64(arena.order[i]) + 1
         if not _shoots(
@@ -182,8 +179,8 @@ def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints): 
     age = np.float64(year.step - trees.birth[row])
     _share(t, sp, age, parts, t.of[sp].alpha * q_base, priority, balance, work, ints)
     for i in range(n):
-        arena.resource[s + i, 0] = work[2, i] if arena.state[s + i] & _TERMINAL else 0.0
-        arena.resource[s + i, 1] = work[3, i] if arena.state[s + i] & _LATERAL else 0.0
+        arena.resource[s + i, 0] = work[2, i] if arena.state[s + i] & TERMINAL else 0.0
+        arena.resource[s + i, 1] = work[3, i] if arena.state[s + i] & LATERAL else 0.0
     if _has_shoot_curves(t, sp):
         _hold_back(arena, s, e, t, sp, year, trees.tree_id[row])
 
@@ -205,7 +202,7 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
         i = s + k
         upkeep += np.float64(arena.sapwood[i]) * np.float64(arena.length[i])
         state = arena.state[i]
-        sites = (1 if state & _TERMINAL else 0) + (1 if state & _LATERAL else 0)
+        sites = (1 if state & TERMINAL else 0) + (1 if state & LATERAL else 0)
         if sites == 0:
             continue
         earned = site_income(np.float64(arena.light[i]), path[k], rate, t.of[sp].hydraulic_length)
@@ -217,14 +214,14 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
                 draw, other, _, _ = random.uniforms(
                     year.seed, STREAM_ABORT, tree_id, arena.serial[i], year.step
                 )
-                if state & _TERMINAL and draw < t.of[sp].abortion:
-                    arena.state[i] &= np.uint8(255 - _TERMINAL)
-                if state & _LATERAL and other < t.of[sp].abortion:
-                    arena.state[i] &= np.uint8(255 - _LATERAL)
+                if state & TERMINAL and draw < t.of[sp].abortion:
+                    arena.state[i] &= np.uint8(255 - TERMINAL)
+                if state & LATERAL and other < t.of[sp].abortion:
+                    arena.state[i] &= np.uint8(255 - LATERAL)
         else:
             arena.deficit[i] = 0
         if retention > 0.0 and year.step - arena.birth[i] >= retention:
-            arena.state[i] &= np.uint8(255 - _LATERAL)
+            arena.state[i] &= np.uint8(255 - LATERAL)
     return income, leaves, t.of[sp].maintenance * to_volume * upkeep
 
 
@@ -266,9 +263,9 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
     v_base = t.of[sp].alpha * q_base / year.full_light
     _share(t, sp, age, parts, v_base, priority, balance, work, ints)
     for i in range(n):
-        if not arena.state[s + i] & _TERMINAL:
+        if not arena.state[s + i] & TERMINAL:
             work[2, i] = 0.0
-        if not arena.state[s + i] & _LATERAL:
+        if not arena.state[s + i] & LATERAL:
             work[3, i] = 0.0
     resource = arena.resource[s:e]
     pipe_cost = 0.25 * np.pi * t.of[sp].density * t.of[sp].first_pipe ** 2

@@ -10,11 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from forest._jit import njit
-
-_MAIN = 1
-_TERMINAL = 2
-_LATERAL = 4
-_CONTINUED = 16
+from forest.growth.bud_fate import lit_buds
+from forest.trees.metamers import CONTINUED, MAIN
 
 
 @njit
@@ -57,11 +54,10 @@ def growth_shares(  # type: ignore[no-untyped-def]
         mass += m
         moment_x += m * 0.5 * (x0 + np.float64(tip[i, 0]))
         moment_y += m * 0.5 * (y0 + np.float64(tip[i, 1]))
-        head[i] = head[p] if i > 0 and state[i] & _MAIN else i
+        head[i] = head[p] if i > 0 and state[i] & MAIN else i
         rate[i] = 0.0
         limb_light[i] = 0.0
-        buds = (1 if state[i] & _TERMINAL else 0) + (1 if state[i] & _LATERAL else 0)
-        q = buds * np.float64(light[i])
+        q = lit_buds(state[i]) * np.float64(light[i])
         limb_light[head[i]] += q
         all_light += q
     for i in range(n):
@@ -92,14 +88,14 @@ def growth_shares(  # type: ignore[no-untyped-def]
         weights[1, i] = rate[head[i]]
     # eq. 15: G sums over limbs; a limb counts where it ends, so once beyond each of its nodes
     for i in range(n - 1, -1, -1):
-        if not state[i] & _CONTINUED:
+        if not state[i] & CONTINUED:
             total[i] += rate[head[i]]
             count[i] += 1
         if i == 0:
             break
         p = parent[i]
         mean = total[i] / count[i]
-        if state[i] & _MAIN:
+        if state[i] & MAIN:
             weights[0, p] = mean
         else:
             weights[1, p] = mean

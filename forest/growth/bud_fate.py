@@ -10,14 +10,25 @@ from __future__ import annotations
 import numpy as np
 
 from forest._jit import njit
+from forest.trees.metamers import (
+    BRANCHED,
+    LATERAL,
+    MAIN,
+    NO_ROOM_LATERAL,
+    NO_ROOM_TERMINAL,
+    TERMINAL,
+)
 
-_MAIN = 1
-_TERMINAL = 2
-_LATERAL = 4
-_BRANCHED = 8
-_CONTINUED = 16
-_NO_ROOM_TERMINAL = 32
-_NO_ROOM_LATERAL = 64
+
+@njit
+def lit_buds(state):  # type: ignore[no-untyped-def]
+    """Count the living buds of a node that have room: those whose light counts."""
+    n = 0
+    if state & TERMINAL and not state & NO_ROOM_TERMINAL:
+        n += 1
+    if state & LATERAL and not state & NO_ROOM_LATERAL:
+        n += 1
+    return n
 
 
 @njit
@@ -40,11 +51,11 @@ def gather_light(parent, state, light, q_main, q_side):  # type: ignore[no-untyp
     for i in range(n):
         s = state[i]
         q = np.float64(light[i])
-        q_main[i] = q if (s & _TERMINAL) and not (s & _NO_ROOM_TERMINAL) else 0.0
-        q_side[i] = q if (s & _LATERAL) and not (s & _NO_ROOM_LATERAL) else 0.0
+        q_main[i] = q if (s & TERMINAL) and not (s & NO_ROOM_TERMINAL) else 0.0
+        q_side[i] = q if (s & LATERAL) and not (s & NO_ROOM_LATERAL) else 0.0
     for i in range(n - 1, 0, -1):
         q = q_main[i] + q_side[i]
-        if state[i] & _MAIN:
+        if state[i] & MAIN:
             q_main[parent[i]] += q
         else:
             q_side[parent[i]] += q
@@ -75,14 +86,14 @@ def share_borchert_honda(  # type: ignore[no-untyped-def]
     for i in range(n):
         if i == 0:
             v = v_base
-        elif state[i] & _MAIN:
+        elif state[i] & MAIN:
             v = v_main[parent[i]]
         else:
             v = v_side[parent[i]]
         lam = bias[min(np.int64(order[i]), last)]
         main = lam * q_main[i] * weights[0, i]
         side = (1.0 - lam) * q_side[i] * weights[1, i]
-        if order[i] >= max_order and state[i] & _LATERAL:
+        if order[i] >= max_order and state[i] & LATERAL:
             side = 0.0
         total = main + side
         if total > 0.0:
@@ -161,15 +172,15 @@ def share_priority(  # type: ignore[no-untyped-def]
         follower[i] = -1
     for i in range(n - 1, -1, -1):
         s = state[i]
-        buds[i] += (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
+        buds[i] += (1 if s & TERMINAL else 0) + (1 if s & LATERAL else 0)
         if i > 0:
             buds[parent[i]] += buds[i]
-            if s & _MAIN:
+            if s & MAIN:
                 follower[parent[i]] = i
             else:
                 on_branch[parent[i]] = buds[i]
     for head in range(n):
-        if head > 0 and state[head] & _MAIN:
+        if head > 0 and state[head] & MAIN:
             continue
         v = v_base if head == 0 else v_side[parent[head]]
         count = 0
@@ -180,7 +191,7 @@ def share_priority(  # type: ignore[no-untyped-def]
             s = state[i]
             v_main[i] = 0.0
             v_side[i] = 0.0
-            living = (s & _BRANCHED and on_branch[i] > 0) or (s & _LATERAL and order[i] < max_order)
+            living = (s & BRANCHED and on_branch[i] > 0) or (s & LATERAL and order[i] < max_order)
             if living and q_side[i] > 0.0:
                 items[count] = i
                 count += 1
@@ -192,7 +203,7 @@ def share_priority(  # type: ignore[no-untyped-def]
         for k in range(count):
             j = items[k]
             v_side[j] = q_side[j] / max(1, on_branch[j])
-        has_tip = state[tip] & _TERMINAL
+        has_tip = state[tip] & TERMINAL
         _sort_by_light(items, count, v_side)
         total_items = count + unlit + (1 if has_tip else 0)
         tip_place = 0

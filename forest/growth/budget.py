@@ -23,8 +23,6 @@ RESERVE_CHANGE = 5
 SPEND = 6
 ACCOUNTS = 7
 
-_TERMINAL = 2
-_LATERAL = 4
 
 # The histogram of thresholds: s from 2**-_OCTAVES to 1 in _STEPS bins per octave.
 _OCTAVES = 20

@@ -23,11 +23,8 @@ from forest.growth.budget import (
 )
 from forest.growth.dealing import BINS, FLOATS, Deal, Scratch
 from forest.growth.parameters import SpeciesTraits, Year
-from forest.trees.metamers import Metamers
+from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
-
-_TERMINAL = 2
-_LATERAL = 4
 
 #: k of supports(R, d) = k d R^2 from the 300-foot limit, m (Hart & Baker 2003, eq. 8).
 SUPPORT = np.pi * 30.48
@@ -67,7 +64,7 @@ def reinforce(parent, length, pipe, density, leaf_mass, state, budget, mass, lac
     volume = 0.25 * np.pi * density
     for i in range(n):
         s = state[i]
-        sites = (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
+        sites = (1 if s & TERMINAL else 0) + (1 if s & LATERAL else 0)
         mass[i] = volume * np.float64(pipe[i]) * np.float64(length[i]) + sites * leaf_mass
     for i in range(n - 1, 0, -1):
         mass[parent[i]] += mass[i]
@@ -139,7 +136,7 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
             if i > 0 and birth[parent[i]] != year.step:
                 surplus[parent[i]] += 1.0  # a bud that shot was a site when the year began
         else:
-            surplus[i] += (1 if state[i] & _TERMINAL else 0) + (1 if state[i] & _LATERAL else 0)
+            surplus[i] += (1 if state[i] & TERMINAL else 0) + (1 if state[i] & LATERAL else 0)
     for i in range(n):
         if surplus[i] > 0.0:
             light = np.float64(arena.light[s + i])

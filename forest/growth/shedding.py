@@ -10,16 +10,11 @@ import numpy as np
 from numba import prange
 
 from forest._jit import njit, njit_parallel
+from forest.growth.bud_fate import lit_buds
 from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
 from forest.growth.parameters import SpeciesTraits
-from forest.trees.metamers import Metamers
+from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
-
-_MAIN = 1
-_TERMINAL = 2
-_LATERAL = 4
-_BRANCHED = 8
-_CONTINUED = 16
 
 
 @njit
@@ -50,8 +45,8 @@ def mark_shed(  # type: ignore[no-untyped-def]
     internodes, sites, gone = ints[0], ints[1], ints[2]
     for i in range(n):
         s = state[i]
-        buds = (1 if s & _TERMINAL else 0) + (1 if s & _LATERAL else 0)
-        gathered[i] = buds * np.float64(light[i])
+        buds = (1 if s & TERMINAL else 0) + (1 if s & LATERAL else 0)
+        gathered[i] = lit_buds(s) * np.float64(light[i])
         sites[i] = buds
         internodes[i] = 1
         loss[i] = 0.0
@@ -68,15 +63,15 @@ def mark_shed(  # type: ignore[no-untyped-def]
             gone[i] = 1
             shed += 1
             continue
-        poor = not state[i] & _MAIN and gathered[i] < threshold * internodes[i]
+        poor = not state[i] & MAIN and gathered[i] < threshold * internodes[i]
         if poor or (drop_bare and sites[i] == 0):
             gone[i] = 1
             shed += 1
             loss[p] += np.float64(sapwood[i]) / (branch_pipe if order[i] > 0 else 1.0)
-            if state[i] & _MAIN:
-                state[p] &= np.uint8(255 - _CONTINUED)
+            if state[i] & MAIN:
+                state[p] &= np.uint8(255 - CONTINUED)
             else:
-                state[p] &= np.uint8(255 - _BRANCHED)
+                state[p] &= np.uint8(255 - BRANCHED)
     if shed > 0:
         for i in range(n - 1, -1, -1):
             if gone[i]:

@@ -20,20 +20,15 @@ from forest.growth.curves import curve
 from forest.growth.dealing import BINS, Deal
 from forest.growth.parameters import (
     LENGTH_BY_ORDER,
+    MAX_ORDERS,
     TROPISM_BY_AGE,
     TROPISM_BY_ORDER,
     SpeciesTraits,
     Year,
 )
 from forest.random import STREAM_PHYLLOTAXIS, STREAM_SHOOT
-from forest.trees.metamers import Metamers
+from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
-
-_MAIN = 1
-_TERMINAL = 2
-_LATERAL = 4
-_BRANCHED = 8
-_CONTINUED = 16
 
 TERMINAL_BUD = 0
 LATERAL_BUD = 1
@@ -194,12 +189,15 @@ def turned(hx, hy, hz, px, py, pz, angle):  # type: ignore[no-untyped-def]
 
 @njit
 def _blocked(solid, trees, row, x0, y0, z0, x1, y1, z1, voxel_m):  # type: ignore[no-untyped-def]
-    """Whether an internode would enter the ground or an obstacle (its middle and end are asked)."""
+    """Whether an internode would enter the ground or an obstacle, asked every half voxel."""
     if z1 <= 0.0:
         return True
     if solid.mask.size == 1:
         return False
-    for part in (0.5, 1.0):
+    length = np.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2 + (z1 - z0) ** 2)
+    steps = max(np.int64(np.ceil(2.0 * length / voxel_m)), 1)
+    for k in range(1, steps + 1):
+        part = k / steps
         x = trees.base_offset[row, 0] + x0 + part * (x1 - x0)
         y = trees.base_offset[row, 1] + y0 + part * (y1 - y0)
         z = trees.base_offset[row, 2] + z0 + part * (z1 - z0)
@@ -246,12 +244,13 @@ def _add(arena, trees, row, at, p, main, hx, hy, hz, length, order, t, year, hei
     arena.length[i] = length
     arena.pipe[i] = 0.0
     arena.sapwood[i] = 0.0
-    arena.light[i] = 0.0
+    # not exposed yet: until next year it is measured by the light of the bud it came from
+    arena.light[i] = arena.light[s + p] if p >= 0 else np.float32(0.0)
     arena.resource[i, 0] = 0.0
     arena.resource[i, 1] = 0.0
     arena.birth[i] = year.step
     arena.order[i] = min(order, 255)
-    arena.state[i] = (_MAIN if main else 0) | _LATERAL
+    arena.state[i] = (MAIN if main else 0) | LATERAL
     arena.deficit[i] = 0
     arena.shoot_height[i] = height
 
@@ -273,9 +272,9 @@ def _steered(t, sp, eta, hx, hy, hz, vx, vy, vz):  # type: ignore[no-untyped-def
 def _bear(arena, s, p, bud):  # type: ignore[no-untyped-def]
     """Note on the parent that its bud has become a shoot."""
     if bud == TERMINAL_BUD:
-        arena.state[s + p] = (arena.state[s + p] & (255 - _TERMINAL)) | _CONTINUED
+        arena.state[s + p] = (arena.state[s + p] & (255 - TERMINAL)) | CONTINUED
     else:
-        arena.state[s + p] = (arena.state[s + p] & (255 - _LATERAL)) | _BRANCHED
+        arena.state[s + p] = (arena.state[s + p] & (255 - LATERAL)) | BRANCHED
 
 
 @njit
@@ -289,7 +288,6 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
         t.curve_n, t.curve_x, t.curve_y, sp, TROPISM_BY_AGE, age
     )
     most = np.int64(t.of[sp].max_metamers)
-    bias = t.of[sp].apical_bias if age < t.apical_until[sp, 0] else 0.5
     # a sylleptic shoot branches as it grows: (parent, bud, resource) still to be grown
     wait_p = np.empty(_STACK, np.int64)
     wait_bud = np.empty(_STACK, np.int64)
@@ -310,6 +308,8 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
             waiting -= 1
             p, bud, left = wait_p[waiting], wait_bud[waiting], wait_v[waiting]
             order = np.int64(arena.order[s + p]) + (1 if bud == LATERAL_BUD else 0)
+            control_ends = t.apical_until[sp, min(order, MAX_ORDERS - 1)]
+            bias = t.of[sp].apical_bias if age < control_ends else 0.5
             eta = by_age * curve(
                 t.curve_n, t.curve_x, t.curve_y, sp, TROPISM_BY_ORDER, np.float64(order)
             )
@@ -350,7 +350,7 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
                     elif not year.paper:
                         arena.resource[s + p, LATERAL_BUD] = _fraction(side)
             if made > 0 and t.of[sp].sympodial == 0.0:
-                arena.state[s + p] |= np.uint8(_TERMINAL)
+                arena.state[s + p] |= np.uint8(TERMINAL)
             if not year.paper:  # what makes no whole metamer stays with the bud that ends the shoot
                 apex = LATERAL_BUD if t.of[sp].sympodial > 0.0 else TERMINAL_BUD
                 arena.resource[s + p, apex if made > 0 else bud] = _fraction(left)
@@ -393,6 +393,6 @@ def sprout(arena: Metamers, trees: Trees, first_row, traits: SpeciesTraits, year
             traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, 0.0
         )
         _add(arena, trees, row, 0, -1, True, 0.0, 0.0, 1.0, unit, 0, traits, year, np.uint8(255))
-        arena.state[s] = _TERMINAL | _LATERAL
+        arena.state[s] = TERMINAL | LATERAL
         arena.pipe[s] = traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent
         trees.size[row] = 1

@@ -56,8 +56,8 @@ def growth_rate(head: Node, base: Node, gains: Gains) -> float:
     norm = float(np.linalg.norm(heading))
     offset = -float(heading @ out_of_line) / (norm * ell) if norm > 0.0 else 0.0
     offset = max(-1.0, min(1.0, offset))
-    p = sum(node.buds * node.light for node in limb)
-    everything = sum(node.buds * node.light for node in base.above())
+    p = sum(node.lit_buds * node.light for node in limb)
+    everything = sum(node.lit_buds * node.light for node in base.above())
     share = p / everything if everything > 0.0 else 0.0
     return (
         gains.min_growth + gains.offset_gain + gains.offset_gain * offset + gains.light_gain * share

@@ -42,6 +42,11 @@ class Node:
     branch: Node | None = None
 
     @property
+    def lit_buds(self) -> int:
+        """Living buds at this node that have room, so that their light counts."""
+        return (self.terminal and self.room_terminal) + (self.lateral and self.room_lateral)
+
+    @property
     def buds(self) -> int:
         """Living buds at this node."""
         return int(self.terminal) + int(self.lateral)

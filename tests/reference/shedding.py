@@ -28,7 +28,7 @@ def shed(base: Node, threshold: float, drop_bare: bool, kappa: float) -> Shed:
         if node.below is None or node in gone:
             continue
         part = list(node.above())
-        light = sum(n.buds * n.light for n in part)
+        light = sum(n.lit_buds * n.light for n in part)
         starts_branch = node.below.branch is node
         poor = starts_branch and light / len(part) < threshold
         bare = drop_bare and sum(n.buds for n in part) == 0
