@@ -5,10 +5,12 @@ The environment is set before numba, matplotlib or VTK are imported.
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 os.environ.setdefault("NUMBA_NUM_THREADS", "2")
@@ -19,6 +21,23 @@ os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 settings.register_profile("here", deadline=None, max_examples=30)
 settings.register_profile("ci", settings.get_profile("here"), derandomize=True, database=None)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let the expectations of tests/golden be rewritten, for a reason that they keep."""
+    parser.addoption(
+        "--update-goldens",
+        metavar="REASON",
+        type=_reason,
+        help="rewrite the expected numbers in tests/golden; the reason is kept beside them",
+    )
+
+
+def _reason(text: str) -> str:
+    words = " ".join(text.split())
+    if len(words) < 8:
+        raise argparse.ArgumentTypeError("say in some words why the numbers may change")
+    return words
 
 
 def _take_own_cache(worker: str) -> None:
