@@ -10,6 +10,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from forest.ensemble.sweep import Sweep, open_sweep, sweep
     from forest.errors import InputError
     from forest.record.run import Run, open_run
     from forest.scenario import Scenario
@@ -27,9 +28,12 @@ _HOMES = {
     "Skeleton": "forest.trees.skeleton",
     "Species": "forest.species",
     "Stand": "forest.stand",
+    "Sweep": "forest.ensemble.sweep",
     "load_species": "forest.species",
     "open_run": "forest.record.run",
+    "open_sweep": "forest.ensemble.sweep",
     "simulate": "forest.simulation",
+    "sweep": "forest.ensemble.sweep",
 }
 
 __all__ = [
@@ -39,9 +43,12 @@ __all__ = [
     "Skeleton",
     "Species",
     "Stand",
+    "Sweep",
     "load_species",
     "open_run",
+    "open_sweep",
     "simulate",
+    "sweep",
 ]
 
 
