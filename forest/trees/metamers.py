@@ -82,7 +82,7 @@ class Arena:
     #: Slack left behind a tree when it is placed, as a share of its size.
     SLACK = 0.12
     #: Growth of the arrays when they are full.
-    GROWTH = 1.25
+    GROWTH = 1.15
 
     def __init__(self, capacity: int = 4096) -> None:
         self.metamers = allocate(max(capacity, 16))
