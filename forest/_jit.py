@@ -1,7 +1,7 @@
 """How kernels are compiled, and where the compiled code is kept.
 
-Numba's own cache misses changes in functions that a kernel calls from another file. The cache
-folder is therefore named by a hash of every file that holds kernels and of numba's version.
+Numba's own cache misses changes in functions and constants that a kernel takes from another file.
+The cache folder is therefore named by a hash of all such files and of numba's version.
 """
 
 from __future__ import annotations
@@ -28,14 +28,20 @@ _KEPT_CACHES = 3
 
 
 def _kernel_hash() -> str:
-    """Hash the sources of all modules that define kernels (those that import this one)."""
+    """Hash all sources on which compiled code hangs.
+
+    These are the modules with kernels (they import this one) and their neighbours in the same
+    room and in `trees`, since a constant of another module is compiled in as well.
+    """
     root = Path(__file__).parent
     digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for path in sorted(root.rglob("*.py")):
-        source = path.read_bytes()
-        if b"forest._jit import" in source or path.name == "_jit.py":
+    sources = {path: path.read_bytes() for path in sorted(root.rglob("*.py"))}
+    kernels = [path for path, text in sources.items() if b"forest._jit import" in text]
+    rooms = {path.parent for path in kernels if path.parent != root} | {root / "trees"}
+    for path, text in sources.items():
+        if path in kernels or path.parent in rooms or path.name == "_jit.py":
             digest.update(path.relative_to(root).as_posix().encode())
-            digest.update(source)
+            digest.update(text)
     return digest.hexdigest()[:16]
 
 

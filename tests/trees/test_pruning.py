@@ -14,7 +14,6 @@ from tests.growth.growing import copied, extent
 from tests.growth.invariants import assert_valid
 from tests.reference.plant import read_plant
 
-
 #: Thickness of a pipe along branches relative to the stem.
 KAPPA = 0.35
 
