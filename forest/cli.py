@@ -27,6 +27,7 @@ _UsageError: Any = typer.BadParameter.__base__
 _REFUSED = 2
 _STOPPED = 130  # as shells report a process that SIGINT ended
 _UNHEARD = 1  # as typer and rich do
+_SOME_FAILED = 1
 
 app = typer.Typer(
     name="forest",
@@ -127,6 +128,78 @@ def run(
         if "stand" in finished.tables:
             _print_stand_table(finished)
         typer.echo(f"{finished.path} holds {len(finished.years)} years")
+
+
+@app.command()
+def sweep(
+    scenarios: Annotated[
+        list[Path], typer.Argument(metavar="SCENARIO.toml...", help="The scenarios.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the run files.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY.PATH=VALUE,VALUE...", help="Vary a key; may be given often."
+        ),
+    ] = None,
+    replicates: Annotated[
+        int, typer.Option(min=1, help="Runs of each combination, each with a seed of its own.")
+    ] = 1,
+    years: Annotated[int | None, typer.Option(min=1, help="Years to grow.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; default: as many as cores.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Use the cluster of a dask scheduler.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw the means over the years.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the sweep in the folder, or add to it.")
+    ] = False,
+    no_progress: Annotated[
+        bool, typer.Option("--no-progress", help="Do not show how the runs go on.")
+    ] = False,
+) -> None:
+    """Grow scenarios under all combinations of settings, over processes; print their means.
+
+    Each run writes one file; manifest.csv and manifest.parquet list them all. Runs that fail are
+    listed and the others go on; the exit code is then 1.
+
+    Examples:
+
+        forest sweep scenarios/saxony_spruce.toml --out spruce --replicates 10
+
+        forest sweep a.toml b.toml --out ab --set site.productivity=0.8,1,1.2 --replicates 5
+    """
+    from forest.ensemble.design import read_settings
+    from forest.ensemble.sweep import sweep as grow_all
+
+    if plot is not None:
+        _check_picture(plot, force=resume)
+    changes = list(settings or [])
+    if years is not None:
+        changes.append(f"years={years}")
+    try:
+        done = grow_all(
+            scenarios,
+            settings=read_settings(changes),
+            replicates=replicates,
+            out=out,
+            workers=workers,
+            scheduler=scheduler,
+            resume=resume,
+            progress=not no_progress,
+        )
+    except KeyboardInterrupt:
+        raise _Stopped("stopped; go on with the same command and --resume") from None
+    if (done.manifest["status"] == "done").any():
+        _print_means(done, plot)
+    for _, run in done.failed.iterrows():
+        typer.echo(f"forest: failed: {run['run']}: {run['error']}", err=True)
+    if len(done.failed):
+        raise typer.Exit(_SOME_FAILED)
 
 
 @app.command()
@@ -270,7 +343,7 @@ def version() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 2 refused, 130 stopped.
+    """Run the command line and exit: 0 done, 1 runs failed, 2 refused, 130 stopped.
 
     Parameters
     ----------
@@ -346,6 +419,18 @@ def _print_stand_table(run: Any) -> None:
     if "stand" not in run.tables:
         raise InputError("holds no stand table", where=str(run.path))
     Console().print(stand_table(run))
+
+
+def _print_means(sweep: Any, plot: Path | None) -> None:
+    from rich.console import Console
+
+    from forest.view.sweep_picture import draw_sweep
+    from forest.view.sweep_table import sweep_table
+
+    Console().print(sweep_table(sweep))
+    if plot is not None:
+        draw_sweep(sweep, plot)
+        typer.echo(f"{plot}: means over the years")
 
 
 def _print_species(one: Species) -> None:
