@@ -131,7 +131,7 @@ def _shoots(t, sp, year, tree_id, serial, height, order, length):  # type: ignor
     product *= curve(
         t.curve_n, t.curve_x, t.curve_y, sp, SHOOTS_BY_PARENT_LENGTH, np.float64(length)
     )
-    r, _, _, _ = random.uniforms(year.seed, STREAM_FATE, tree_id, serial, year.step)
+    r, _, _, _ = random.uniforms(year.seed, np.int64(STREAM_FATE), tree_id, serial, year.step)
     return product * r > 1.0
 
 
@@ -212,7 +212,7 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
             arena.deficit[i] = np.uint8(min(255, np.int64(arena.deficit[i]) + 1))
             if arena.deficit[i] > t.of[sp].deficit_years:
                 draw, other, _, _ = random.uniforms(
-                    year.seed, STREAM_ABORT, tree_id, arena.serial[i], year.step
+                    year.seed, np.int64(STREAM_ABORT), tree_id, arena.serial[i], year.step
                 )
                 if state & TERMINAL and draw < t.of[sp].abortion:
                     arena.state[i] &= np.uint8(255 - TERMINAL)

@@ -13,13 +13,14 @@ from forest.species import Species
 #: Orders told apart where a parameter is given by order; higher orders use the last.
 MAX_ORDERS = 8
 
-# Rows of SpeciesTraits.curve_*: which user-drawn curve (Taylor-Hell 2005, 3.1).
-LENGTH_BY_ORDER = 0
-SHOOTS_BY_HEIGHT = 1
-SHOOTS_BY_ORDER = 2
-SHOOTS_BY_PARENT_LENGTH = 3
-TROPISM_BY_AGE = 4
-TROPISM_BY_ORDER = 5
+# Rows of SpeciesTraits.curve_*: which user-drawn curve (Taylor-Hell 2005, 3.1). Not plain numbers:
+# numba compiles a kernel anew for each of those.
+LENGTH_BY_ORDER = np.int64(0)
+SHOOTS_BY_HEIGHT = np.int64(1)
+SHOOTS_BY_ORDER = np.int64(2)
+SHOOTS_BY_PARENT_LENGTH = np.int64(3)
+TROPISM_BY_AGE = np.int64(4)
+TROPISM_BY_ORDER = np.int64(5)
 _CURVES = (
     ("architecture", "internode_factor_by_order"),
     ("architecture", "shoots_by_height_in_year"),

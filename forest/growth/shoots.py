@@ -143,7 +143,9 @@ def headings(arena: Metamers, trees: Trees, shared: Deal, shoots: Shoots, out): 
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             for j in range(shoots.first[row], shoots.first[row + 1]):
-                x, y, z = bud_heading(arena, trees.start[row], shoots.metamer[j], shoots.bud[j])
+                x, y, z = bud_heading(
+                    arena, trees.start[row], np.int64(shoots.metamer[j]), np.int64(shoots.bud[j])
+                )
                 out[j, 0] = x
                 out[j, 1] = y
                 out[j, 2] = z
@@ -222,7 +224,8 @@ def _add(arena, trees, row, at, p, main, hx, hy, hz, length, order, t, year, hei
         arena.tip[i, k] = below + length * (hx if k == 0 else (hy if k == 1 else hz))
     serial = trees.next_serial[row]
     trees.next_serial[row] = serial + 1
-    a, b, _, _ = random.uniforms(year.seed, STREAM_SHOOT, trees.tree_id[row], serial, 0)
+    tree_id = trees.tree_id[row]
+    a, b, _, _ = random.uniforms(year.seed, np.int64(STREAM_SHOOT), tree_id, serial, np.int64(0))
     if main and p >= 0:
         px, py, pz = perpendicular(
             hx, hy, hz, arena.bud[s + p, 0], arena.bud[s + p, 1], arena.bud[s + p, 2]
@@ -230,7 +233,9 @@ def _add(arena, trees, row, at, p, main, hx, hy, hz, length, order, t, year, hei
         turn = t.of[sp].divergence_angle + (2.0 * a - 1.0) * t.of[sp].angle_jitter
     else:
         px, py, pz = perpendicular(hx, hy, hz, 1.0, 0.0, 0.0)
-        u, _, _, _ = random.uniforms(year.seed, STREAM_PHYLLOTAXIS, trees.tree_id[row], serial, 0)
+        u, _, _, _ = random.uniforms(
+            year.seed, np.int64(STREAM_PHYLLOTAXIS), tree_id, serial, np.int64(0)
+        )
         turn = 2.0 * np.pi * u
     px, py, pz = turned(hx, hy, hz, px, py, pz, turn)
     angle = t.of[sp].branching_angle + (2.0 * b - 1.0) * t.of[sp].angle_jitter
@@ -282,7 +287,7 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
     """Grow all shoots of one tree at the end of its extent; new parents precede new children."""
     s = trees.start[row]
     sp = trees.species[row]
-    end = trees.size[row]
+    end = np.int64(trees.size[row])
     age = np.float64(year.step - trees.birth[row])
     by_age = t.of[sp].tropism_weight * curve(
         t.curve_n, t.curve_x, t.curve_y, sp, TROPISM_BY_AGE, age
@@ -392,7 +397,9 @@ def sprout(arena: Metamers, trees: Trees, first_row, traits: SpeciesTraits, year
         unit = traits.of[sp].internode_length * curve(
             traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, 0.0
         )
-        _add(arena, trees, row, 0, -1, True, 0.0, 0.0, 1.0, unit, 0, traits, year, np.uint8(255))
+        # typed as where shoots go on, so that numba compiles no second _add
+        at, below, main, last = np.int64(0), np.int64(-1), np.bool_(True), np.uint8(255)
+        _add(arena, trees, row, at, below, main, 0.0, 0.0, 1.0, unit, at, traits, year, last)
         arena.state[s] = TERMINAL | LATERAL
         arena.pipe[s] = traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent
         trees.size[row] = 1
