@@ -281,6 +281,15 @@ def test_no_scheduler_at_the_address(tmp_path: Path) -> None:
         sweep({"tiny": tiny("years=1")}, out=tmp_path / "out", scheduler="nowhere://at-all")
 
 
+def test_workers_of_several_threads(tmp_path: Path) -> None:
+    scenarios = {"tiny": tiny("years=1")}
+    with (
+        LocalCluster(1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        pytest.raises(InputError, match="expected one thread each"),
+    ):
+        sweep(scenarios, out=tmp_path / "out", scheduler=cluster.scheduler_address)
+
+
 def test_without_dask_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"forest-stand\[cluster\]"):

@@ -61,9 +61,9 @@ def sweep_table(sweep: HasMeans) -> Table:
 
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     for name in varied(sweep):
-        table.add_column(name, vertical="bottom", overflow="fold")
+        table.add_column(f"\n{name}", overflow="fold")
     for name in ("year", "runs"):
-        table.add_column(name, justify="right", vertical="bottom")
+        table.add_column(f"\n{name}", justify="right")
     for heading, _ in _COLUMNS.values():
         table.add_column(heading, justify="right", no_wrap=True)
     columns = {name: means_of_sets(sweep, name) for name in _COLUMNS}
