@@ -134,25 +134,23 @@ class Arena:
         room: NDArray[np.int32],
         wanted: NDArray[np.int64],
     ) -> None:
-        """Close all holes, then spread the extents with fresh slack, growing if needed."""
+        """Lay all extents out anew, in the order they stand, with fresh slack; grow if needed.
+
+        Each tree moves once: those that move down from the lowest on, then those that move up from
+        the highest on. Order is kept, so nothing is written where another tree still stands.
+        """
         by_place = np.argsort(start, kind="stable")
-        end = 0
-        for tree in by_place:
-            n = int(size[tree])
-            if start[tree] != end:
-                self._move(int(start[tree]), end, n)
-                start[tree] = end
-            end += n
         need = np.maximum(wanted, size).astype(np.int64)
         length = need + (need * self.SLACK).astype(np.int64) + 4
         total = int(length.sum())
         if total > self.capacity:
-            self._grow(int(total * self.GROWTH), end)
+            self._grow(int(total * self.GROWTH), self.used)
         place = np.empty(len(start), np.int64)
         place[by_place] = np.concatenate(([0], np.cumsum(length[by_place])[:-1]))
-        for tree in by_place[::-1]:
-            if place[tree] != start[tree]:
-                self._move(int(start[tree]), int(place[tree]), int(size[tree]))
+        down = [tree for tree in by_place if place[tree] < start[tree]]
+        up = [tree for tree in by_place[::-1] if place[tree] > start[tree]]
+        for tree in down + up:
+            self._move(int(start[tree]), int(place[tree]), int(size[tree]))
         start[:] = place
         room[:] = length
         self.used = total
