@@ -22,13 +22,13 @@ from tests.benchmarks import costs, machine, report, runs, stands
 class Extent(NamedTuple):
     """How much is measured."""
 
-    across: tuple[int, ...]  # tiles along each edge of the stands, of about 10^5 metamers each
+    across: tuple[int, ...]  # tiles along each edge of the stands, of about 40,000 metamers each
     rounds: tuple[int, ...]  # of each stand
     run: tuple[str, ...]  # changes to the hectare
     repeats: int  # of the paper's tree and of the warm start
 
 
-FULL = Extent(across=(1, 3, 11), rounds=(9, 5, 3), run=(), repeats=3)
+FULL = Extent(across=(2, 5, 17), rounds=(9, 5, 3), run=(), repeats=3)
 QUICK = Extent(across=(1, 3), rounds=(5, 3), run=("plot.size_m=[24, 24]", "years=30"), repeats=1)
 
 

@@ -18,7 +18,7 @@ from forest.yearbook import YearRecord
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 TILE_M = 12.0
-#: The tile's canopy has closed; about 10^5 metamers, two fifths of which bear a living site.
+#: The canopy of the tile has closed; about 40,000 metamers, two fifths of which bear a living site.
 TILE_YEARS = 25
 
 _PLACE_IN_MEMORY = ("tree_start", "tree_room")
