@@ -5,12 +5,9 @@ Every command imports what it needs when it is called, so that help and refusals
 
 from __future__ import annotations
 
-import logging
 import os
 import sys
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -360,10 +357,10 @@ class _Stopped(Exception):
 
 def _answer(command: Callable[[], Any]) -> int:
     """Carry out a command; turn what users cause into one line and an exit code."""
-    from forest.errors import InputError
+    from forest.errors import InputError, libraries_silenced
 
     try:
-        with _libraries_silenced():
+        with libraries_silenced():
             code = command()
         sys.stdout.flush()
     except _UsageError as error:
@@ -378,18 +375,6 @@ def _answer(command: Callable[[], Any]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _UNHEARD
     return code if isinstance(code, int) else 0
-
-
-@contextmanager
-def _libraries_silenced() -> Iterator[None]:
-    """Keep what libraries warn of off the screen: what a user must know comes as an error."""
-    logging.disable()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logging.disable(logging.NOTSET)
 
 
 def _refuse(message: str) -> int:

@@ -1,10 +1,13 @@
-"""The errors that a user's input can cause."""
+"""The errors that a user's input can cause, and silence for what libraries say beside them."""
 
 from __future__ import annotations
 
 import difflib
 import errno
-from collections.abc import Iterable
+import logging
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class InputError(ValueError):
@@ -48,3 +51,15 @@ def nearest(name: str, known: Iterable[str]) -> str:
     if close:
         return f"did you mean '{close[0]}'?"
     return "one of " + ", ".join(choices)
+
+
+@contextmanager
+def libraries_silenced() -> Iterator[None]:
+    """Keep what libraries warn of off the screen: what a user must know comes as an error."""
+    logging.disable()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(logging.NOTSET)

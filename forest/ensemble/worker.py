@@ -7,16 +7,13 @@ keeps its kernels and how many threads it has before numba is loaded.
 from __future__ import annotations
 
 import contextlib
-import logging
 import os
 import shutil
 import sys
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from forest.errors import InputError, OutputError
+from forest.errors import InputError, OutputError, libraries_silenced
 
 if TYPE_CHECKING:
     from forest.scenario import Scenario
@@ -54,7 +51,7 @@ def grow(scenario_toml: str, digest: str, path: str) -> float:
     scenario = Scenario.from_toml(scenario_toml, where=out.stem)
     seconds = verified_seconds(out, digest, scenario.years)
     if seconds is None:
-        with _libraries_silenced():
+        with libraries_silenced():
             _simulate(scenario, part)
         seconds = verified_seconds(part, digest, scenario.years)
         if seconds is None:
@@ -108,18 +105,6 @@ def _simulate(scenario: Scenario, part: Path) -> None:
         else:
             return
     simulate(scenario, part, threads=1, overwrite=True, command=command).close()
-
-
-@contextlib.contextmanager
-def _libraries_silenced() -> Iterator[None]:
-    """Keep what libraries warn of off the screen: what went wrong comes as an error."""
-    logging.disable()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logging.disable(logging.NOTSET)
 
 
 def _settle_process() -> None:

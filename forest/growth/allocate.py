@@ -160,13 +160,9 @@ def _hold_back(arena, s, e, t, sp, year, tree_id):  # type: ignore[no-untyped-de
 
 
 @njit
-def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints):  # type: ignore[no-untyped-def]
-    """Palubicki 4.2: v_base = alpha Q_base."""
-    s = trees.start[row]
-    n = trees.size[row]
-    e = s + n
-    sp = trees.species[row]
-    parts = (
+def _parts(arena, s, e):  # type: ignore[no-untyped-def]
+    """One tree's part of the fields that bud fate reads."""
+    return (
         arena.parent[s:e],
         arena.state[s:e],
         arena.order[s:e],
@@ -175,6 +171,16 @@ def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints): 
         arena.pipe[s:e],
         arena.light[s:e],
     )
+
+
+@njit
+def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints):  # type: ignore[no-untyped-def]
+    """Palubicki 4.2: v_base = alpha Q_base."""
+    s = trees.start[row]
+    n = trees.size[row]
+    e = s + n
+    sp = trees.species[row]
+    parts = _parts(arena, s, e)
     q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
     age = np.float64(year.step - trees.birth[row])
     _share(t, sp, age, parts, t.of[sp].alpha * q_base, priority, balance, work, ints)
@@ -232,15 +238,7 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
     n = trees.size[row]
     e = s + n
     sp = trees.species[row]
-    parts = (
-        arena.parent[s:e],
-        arena.state[s:e],
-        arena.order[s:e],
-        arena.tip[s:e],
-        arena.length[s:e],
-        arena.pipe[s:e],
-        arena.light[s:e],
-    )
+    parts = _parts(arena, s, e)
     path, pipe_path = work[4], work[5]
     path_lengths(parts[0], parts[2], parts[4], t.of[sp].branch_pipe, path, pipe_path)
     rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
