@@ -14,10 +14,6 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TypeVar
 
-# Threads that wait must not spin: where other programs use the cores, spinning made two threads
-# seven times slower than one. This must be set before numba loads its threads.
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-
 import numba
 from numba.core import config
 from numba.core.event import Event, Listener, install_listener
@@ -88,15 +84,9 @@ def announce_compiling(tell: Callable[[], None]) -> AbstractContextManager[None]
 
 
 def njit(function: F) -> F:
-    """Compile a serial kernel: cached, no fastmath, division as in C."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    """Compile a kernel: cached, no fastmath, division as in C, run without Python's lock.
 
-
-def njit_parallel(function: F) -> F:
-    """Compile a driver that runs fixed chunks in threads (three times the compile time)."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True, parallel=True)(function)  # type: ignore[no-any-return]
-
-
-def inline(function: F) -> F:
-    """Compile a small function into its callers."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True, inline="never")(function)  # type: ignore[no-any-return]
+    No kernel uses numba's own threads (see `forest._threads`), nor is called from C.
+    """
+    compiled = numba.njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True)
+    return compiled(function)  # type: ignore[no-any-return]

@@ -5,14 +5,21 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
-from forest.environment.marker_buds import CHUNKS
+from forest._jit import njit
+from forest._threads import in_threads
+from forest.environment.marker_buds import CHUNKS, Buds
 from forest.environment.marker_tiles import (
     CELLS,
     EDGE,
+    Cloud,
+    Entries,
+    Envelopes,
+    Gone,
+    Lattice,
+    Rows,
+    Sites,
     cell_words,
     inside,
     jitter,
@@ -280,8 +287,10 @@ def _work_on_tile(
             cloud_winner[free.code[m] - CELLS] = free.winner[m]
 
 
-@njit_parallel
-def compete(
+@njit
+def _compete_chunks(
+    first: Any,
+    step: Any,
     lattice: Any,
     entries: Any,
     rows_near: Any,
@@ -294,29 +303,11 @@ def compete(
     release: Any,
     tiles: Any,
     scratch_size: Any,
-) -> Any:
-    """Take the markers near buds and give the free ones to buds.
-
-    Parameters
-    ----------
-    lattice, entries, rows_near, rows_far, sites, buds, envelopes, cloud
-        See their classes; the rows reach as far as occupancy (near) and perception (far).
-    gone : Gone
-        Markers that are gone for good; updated unless `release`.
-    tiles : int64 (n,)
-        Tiles to work on, as flat indices of the box.
-    scratch_size : int
-        Largest number of markers in a tile.
-
-    Returns
-    -------
-    winner, cloud_winner : int32 (n, 64), int32 (n_cloud,)
-        Entry that each marker belongs to; -1 for none.
-    """
-    winner = np.empty((len(tiles), CELLS), np.int32)
-    cloud_winner = np.full(len(cloud.point), -1, np.int32)
+    winner: Any,
+    cloud_winner: Any,
+) -> None:
     blocks = (len(tiles) + _BLOCK - 1) // _BLOCK
-    for c in prange(CHUNKS):
+    for c in range(first, CHUNKS, step):
         free = Scratch(
             np.empty((3, scratch_size)),
             np.empty(scratch_size, np.int64),
@@ -341,4 +332,57 @@ def compete(
                     winner[t],
                     cloud_winner,
                 )
+
+
+def compete(
+    lattice: Lattice,
+    entries: Entries,
+    rows_near: Rows,
+    rows_far: Rows,
+    sites: Sites,
+    buds: Buds,
+    envelopes: Envelopes,
+    cloud: Cloud,
+    gone: Gone,
+    release: bool,
+    tiles: NDArray[np.int64],
+    scratch_size: int,
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Take the markers near buds and give the free ones to buds.
+
+    Parameters
+    ----------
+    lattice, entries, rows_near, rows_far, sites, buds, envelopes, cloud
+        See their classes; the rows reach as far as occupancy (near) and perception (far).
+    gone : Gone
+        Markers that are gone for good; updated unless `release`.
+    tiles : int64 (n,)
+        Tiles to work on, as flat indices of the box.
+    scratch_size : int
+        Largest number of markers in a tile.
+
+    Returns
+    -------
+    winner, cloud_winner : int32 (n, 64), int32 (n_cloud,)
+        Entry that each marker belongs to; -1 for none.
+    """
+    winner = np.empty((len(tiles), CELLS), np.int32)
+    cloud_winner = np.full(len(cloud.point), -1, np.int32)
+    in_threads(
+        _compete_chunks,
+        lattice,
+        entries,
+        rows_near,
+        rows_far,
+        sites,
+        buds,
+        envelopes,
+        cloud,
+        gone,
+        release,
+        tiles,
+        scratch_size,
+        winner,
+        cloud_winner,
+    )
     return winner, cloud_winner

@@ -9,9 +9,10 @@ and the rest of the year's spend is laid down as pipes from the sites that earne
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
+from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
+from forest._jit import njit
+from forest._threads import in_threads
 from forest.growth.allocate import income_rate
 from forest.growth.budget import (
     EXTENSION,
@@ -173,18 +174,9 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
     )
 
 
-@njit_parallel
-def thicken(
-    arena: Metamers,
-    trees: Trees,
-    shared: Deal,
-    scratch: Scratch,
-    traits: SpeciesTraits,
-    year: Year,
-    accounts,
-):  # type: ignore[no-untyped-def]
-    """Thicken all trees; in mass-balance mode book extension and ring in `accounts`."""
-    for b in prange(BINS):
+@njit
+def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, accounts):  # type: ignore[no-untyped-def]
+    for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             n = np.int64(trees.size[row])
@@ -203,3 +195,16 @@ def thicken(
                 )
             else:
                 _thicken_balanced(arena, trees, row, traits, year, accounts, work)
+
+
+def thicken(
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    scratch: Scratch,
+    traits: SpeciesTraits,
+    year: Year,
+    accounts: NDArray[np.float64],
+) -> None:
+    """Thicken all trees; in mass-balance mode book extension and ring in `accounts`."""
+    in_threads(_thicken_chunks, arena, trees, shared, scratch, traits, year, accounts)
