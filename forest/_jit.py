@@ -12,7 +12,7 @@ import shutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 from numba.core import config
@@ -83,10 +83,26 @@ def announce_compiling(tell: Callable[[], None]) -> AbstractContextManager[None]
     return context
 
 
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "error_model": "numpy",
+    "nogil": True,
+    "no_cfunc_wrapper": True,
+}
+
+
 def njit(function: F) -> F:
     """Compile a kernel: cached, no fastmath, division as in C, run without Python's lock.
 
     No kernel uses numba's own threads (see `forest._threads`), nor is called from C.
     """
-    compiled = numba.njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True)
-    return compiled(function)  # type: ignore[no-any-return]
+    return numba.njit(**_OPTIONS, _nrt=True)(function)  # type: ignore[no-any-return]
+
+
+def driver(function: F) -> F:
+    """Compile a kernel that `forest._threads.in_threads` runs over its chunks.
+
+    Its arrays belong to the caller, so references to them need not be counted: counting took up
+    to half of a kernel's time. A driver must not make arrays itself; what it calls may.
+    """
+    return numba.njit(**_OPTIONS, _nrt=False)(function)  # type: ignore[no-any-return]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.environment.light_grid import ShadowField, place_in, window_of
 from forest.environment.obstacles import Solid, solid_at
@@ -160,8 +160,46 @@ def _to_least_shadow(
 
 
 @njit
-def _direction_chunks(
-    begin: Any,
+def _direct(
+    first: Any,
+    last: Any,
+    metamers: Any,
+    trees: Any,
+    shoots: Any,
+    field: Any,
+    solid: Any,
+    around: Any,
+    shade_units: Any,
+    voxel_m: Any,
+    gradient: Any,
+    out: Any,
+) -> None:
+    """Set the directions of the shoots `first` to `last`."""
+    heading = np.empty(3, np.float32)
+    row = np.searchsorted(shoots.first, first, side="right") - 1
+    for k in range(first, last):
+        while k >= shoots.first[row + 1]:
+            row += 1
+        i = np.int64(shoots.metamer[k])
+        species = trees.species[row]
+        tip = metamers.tip[trees.start[row] + i]
+        bud = _Bud(
+            site_voxel(trees.base_voxel[row, 0], trees.base_offset[row, 0], tip[0], voxel_m),
+            site_voxel(trees.base_voxel[row, 1], trees.base_offset[row, 1], tip[1], voxel_m),
+            site_voxel(trees.base_voxel[row, 2], trees.base_offset[row, 2], tip[2], voxel_m),
+            np.int64(shade_units[species]),
+        )
+        if gradient:
+            _against_gradient(field, bud, out[k])
+        else:
+            kind = np.int64(shoots.bud[k])
+            heading[0], heading[1], heading[2] = bud_heading(metamers, trees.start[row], i, kind)
+            _to_least_shadow(field, solid, around, bud, species, heading, out[k])
+
+
+@driver
+def _direct_chunks(
+    first: Any,
     step: Any,
     metamers: Any,
     trees: Any,
@@ -175,30 +213,21 @@ def _direction_chunks(
     out: Any,
 ) -> None:
     n = len(shoots.metamer)
-    heading = np.empty(3, np.float32)
-    for chunk in range(begin, CHUNKS, step):
-        start = chunk * n // CHUNKS
-        row = np.searchsorted(shoots.first, start, side="right") - 1
-        for k in range(start, (chunk + 1) * n // CHUNKS):
-            while k >= shoots.first[row + 1]:
-                row += 1
-            i = np.int64(shoots.metamer[k])
-            species = trees.species[row]
-            tip = metamers.tip[trees.start[row] + i]
-            bud = _Bud(
-                site_voxel(trees.base_voxel[row, 0], trees.base_offset[row, 0], tip[0], voxel_m),
-                site_voxel(trees.base_voxel[row, 1], trees.base_offset[row, 1], tip[1], voxel_m),
-                site_voxel(trees.base_voxel[row, 2], trees.base_offset[row, 2], tip[2], voxel_m),
-                np.int64(shade_units[species]),
-            )
-            if gradient:
-                _against_gradient(field, bud, out[k])
-            else:
-                kind = np.int64(shoots.bud[k])
-                heading[0], heading[1], heading[2] = bud_heading(
-                    metamers, trees.start[row], i, kind
-                )
-                _to_least_shadow(field, solid, around, bud, species, heading, out[k])
+    for chunk in range(first, CHUNKS, step):
+        _direct(
+            chunk * n // CHUNKS,
+            (chunk + 1) * n // CHUNKS,
+            metamers,
+            trees,
+            shoots,
+            field,
+            solid,
+            around,
+            shade_units,
+            voxel_m,
+            gradient,
+            out,
+        )
 
 
 def preferred_directions(
@@ -241,7 +270,7 @@ def preferred_directions(
     """
     out = np.empty((len(shoots.metamer), 3), np.float32)
     in_threads(
-        _direction_chunks,
+        _direct_chunks,
         metamers,
         trees,
         shoots,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.environment.voxels import wrap
 
@@ -150,7 +150,7 @@ def _shade_strip(field: Any, first_row: Any, last_row: Any) -> None:
                     _add_squares(out, integral[slot], row, q, q_max, field.weights[q])
 
 
-@njit
+@driver
 def _propagate_strips(first: Any, step: Any, field: Any) -> None:
     ny = field.counts.shape[1]
     strips = (ny + STRIP - 1) // STRIP

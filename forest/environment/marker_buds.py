@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
@@ -88,7 +88,7 @@ def _count_in(state: Any, start: Any, end: Any) -> Any:
     return buds
 
 
-@njit
+@driver
 def _count_buds(
     first: Any, step: Any, metamers: Any, trees: Any, first_site: Any, count: Any
 ) -> None:
@@ -144,7 +144,7 @@ def _fill_tree(metamers: Any, trees: Any, t: Any, first: Any, end: Any, b: Any, 
     return b
 
 
-@njit
+@driver
 def _fill_buds(
     first: Any, step: Any, metamers: Any, trees: Any, first_site: Any, first_bud: Any, buds: Any
 ) -> None:
@@ -221,7 +221,7 @@ def _mark_tree(states: Any, found: Any, b: Any) -> None:
         states[k] = state
 
 
-@njit
+@driver
 def _mark_room(
     begin: Any, step: Any, metamers: Any, trees: Any, first_site: Any, space: Any
 ) -> None:

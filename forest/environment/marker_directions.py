@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.environment.marker_buds import CHUNKS, chunk_bounds
 from forest.environment.marker_tiles import CELLS, EDGE, Cloud, Entries, Lattice, cell_words, jitter
@@ -62,7 +62,7 @@ def _marker(lattice: Any, tile: Any, code: Any) -> Any:
     return x, (j + v) * lattice.cell[1], (k + w) * lattice.cell[2]
 
 
-@njit
+@driver
 def _direction_chunks(
     begin: Any,
     step: Any,

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.environment.marker_buds import CHUNKS, Buds
 from forest.environment.marker_tiles import (
@@ -288,6 +288,51 @@ def _work_on_tile(
 
 
 @njit
+def _compete_chunk(
+    chunk: Any,
+    lattice: Any,
+    entries: Any,
+    rows_near: Any,
+    rows_far: Any,
+    sites: Any,
+    buds: Any,
+    envelopes: Any,
+    cloud: Any,
+    gone: Any,
+    release: Any,
+    tiles: Any,
+    scratch_size: Any,
+    winner: Any,
+    cloud_winner: Any,
+) -> None:
+    blocks = (len(tiles) + _BLOCK - 1) // _BLOCK
+    free = Scratch(
+        np.empty((3, scratch_size)),
+        np.empty(scratch_size, np.int64),
+        np.empty(scratch_size),
+        np.empty(scratch_size, np.int64),
+    )
+    for block in range(chunk, blocks, CHUNKS):
+        for t in range(block * _BLOCK, min((block + 1) * _BLOCK, len(tiles))):
+            _work_on_tile(
+                lattice,
+                entries,
+                rows_near,
+                rows_far,
+                sites,
+                buds,
+                envelopes,
+                cloud,
+                gone,
+                release,
+                tiles[t],
+                free,
+                winner[t],
+                cloud_winner,
+            )
+
+
+@driver
 def _compete_chunks(
     first: Any,
     step: Any,
@@ -306,32 +351,24 @@ def _compete_chunks(
     winner: Any,
     cloud_winner: Any,
 ) -> None:
-    blocks = (len(tiles) + _BLOCK - 1) // _BLOCK
-    for c in range(first, CHUNKS, step):
-        free = Scratch(
-            np.empty((3, scratch_size)),
-            np.empty(scratch_size, np.int64),
-            np.empty(scratch_size),
-            np.empty(scratch_size, np.int64),
+    for chunk in range(first, CHUNKS, step):
+        _compete_chunk(
+            chunk,
+            lattice,
+            entries,
+            rows_near,
+            rows_far,
+            sites,
+            buds,
+            envelopes,
+            cloud,
+            gone,
+            release,
+            tiles,
+            scratch_size,
+            winner,
+            cloud_winner,
         )
-        for block in range(c, blocks, CHUNKS):
-            for t in range(block * _BLOCK, min((block + 1) * _BLOCK, len(tiles))):
-                _work_on_tile(
-                    lattice,
-                    entries,
-                    rows_near,
-                    rows_far,
-                    sites,
-                    buds,
-                    envelopes,
-                    cloud,
-                    gone,
-                    release,
-                    tiles[t],
-                    free,
-                    winner[t],
-                    cloud_winner,
-                )
 
 
 def compete(

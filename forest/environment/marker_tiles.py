@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.random import STREAM_MARKER, philox
 
@@ -237,7 +237,7 @@ def row_bounds(lattice: Any, first: Any, rows: Any, r: Any, x: Any, y: Any, z: A
     return first[row - half], first[row + half + 1]
 
 
-@njit
+@driver
 def _reach_lines(
     start: Any, step: Any, lattice: Any, first: Any, rows: Any, gone: Any, use_gone: Any, flags: Any
 ) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.environment.canopy import CanopyField, coarse, frame_of, layers_above
 from forest.environment.light_grid import ShadowField, place_in, window_of
@@ -107,7 +107,7 @@ def _deposit_block(
             leaves[z, y, x] += leaf * buds
 
 
-@njit
+@driver
 def _deposit_slabs(
     start: Any,
     step: Any,
@@ -203,7 +203,7 @@ def _read_block(
         light[k] = np.float32(found)
 
 
-@njit
+@driver
 def _read_chunks(
     first: Any,
     step: Any,
@@ -216,8 +216,9 @@ def _read_chunks(
     units: Any,
     full_light: Any,
 ) -> None:
+    n = len(blocks.tree)
     for hand in range(first, HANDS, step):
-        for block in range(hand, len(blocks.tree), HANDS):
+        for block in range(n * hand // HANDS, n * (hand + 1) // HANDS):
             tree = blocks.tree[block]
             own = near.unit * units.shade[trees.species[tree]] * near.weights[0]
             sites = (blocks.first[block], blocks.last[block])

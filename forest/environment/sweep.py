@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 
 #: Directions are dealt to this many groups, whatever the number of threads.
@@ -168,18 +168,24 @@ def _sweep_direction(
 
 
 @njit
+def _sweep_group(
+    group: Any, depth: Any, rays: Any, periodic: Any, result: Any, ground: Any
+) -> None:
+    _, ny, nx = depth.shape
+    planes = np.empty((2, ny + 2, nx + 2), np.float32)
+    for d in range(group, len(rays.steps), GROUPS):
+        _sweep_direction(d, depth, rays, planes, periodic, result, ground)
+
+
+@driver
 def _sweep_groups(
     first: Any, step: Any, depth: Any, rays: Any, periodic: Any, results: Any, grounds: Any
 ) -> None:
-    _, ny, nx = depth.shape
-    n = len(rays.steps)
     for group in range(first, GROUPS, step):
-        planes = np.empty((2, ny + 2, nx + 2), np.float32)
-        for d in range(group, n, GROUPS):
-            _sweep_direction(d, depth, rays, planes, periodic, results[group], grounds[group])
+        _sweep_group(group, depth, rays, periodic, results[group], grounds[group])
 
 
-@njit
+@driver
 def _add_groups(
     first: Any, step: Any, results: Any, grounds: Any, result: Any, ground: Any
 ) -> None:

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
 
 #: Sites per block: small enough to balance threads, large enough to hide the loop's cost.
 BLOCK = 2048
-#: Hands to which blocks are dealt in turn; fixed, so that no result depends on the threads.
+#: Hands among which blocks are dealt, in their order; fixed, so that no result depends on threads.
 HANDS = 64
 
 
@@ -89,13 +89,13 @@ def _bound_tips(metamers: Any, first: Any, last: Any) -> Any:
     return (x0, y0, z0), (x1, y1, z1)
 
 
-@njit
+@driver
 def _bound_chunks(
     first: Any, step: Any, metamers: Any, trees: Any, blocks: Any, voxel_m: Any, bounds: Any
 ) -> None:
     n = len(blocks.tree)
     for hand in range(first, HANDS, step):
-        for block in range(hand, n, HANDS):
+        for block in range(n * hand // HANDS, n * (hand + 1) // HANDS):
             tree = blocks.tree[block]
             low, high = _bound_tips(metamers, blocks.first[block], blocks.last[block])
             for axis in range(3):

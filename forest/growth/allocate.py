@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest import random
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.balance import growth_shares
 from forest.growth.bud_fate import gather_light, share_borchert_honda, share_priority
@@ -287,7 +287,7 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
         _hold_back(arena, s, e, t, sp, year, trees.tree_id[row])
 
 
-@njit
+@driver
 def _allocate_chunks(
     first, step, arena, trees, shared, scratch, traits, year, accounts, paper, priority, balance
 ):  # type: ignore[no-untyped-def]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.allocate import income_rate
 from forest.growth.budget import (
@@ -174,7 +174,7 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
     )
 
 
-@njit
+@driver
 def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, accounts):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):

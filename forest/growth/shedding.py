@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.bud_fate import lit_buds
 from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
@@ -143,7 +143,7 @@ def _shed_tree(arena, trees, row, t, drop_bare, work, ints):  # type: ignore[no-
         trees.size[row] = close_ranks(arena, s, n, ints[2], ints[0])
 
 
-@njit
+@driver
 def _shed_chunks(first, step, arena, trees, shared, scratch, traits, drop_bare):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):

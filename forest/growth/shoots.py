@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest import random
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.environment.obstacles import Solid, solid_at
 from forest.growth.curves import curve
@@ -43,7 +43,7 @@ def _fraction(v):  # type: ignore[no-untyped-def]
     return min(v - np.floor(v), 0.9999999)
 
 
-@njit
+@driver
 def _count(first, step, arena, trees, shared, traits, shoots, new):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
@@ -60,7 +60,7 @@ def _count(first, step, arena, trees, shared, traits, shoots, new):  # type: ign
             new[row] = metamers
 
 
-@njit
+@driver
 def _list(begin, step, arena, trees, shared, first, metamer, bud_kind):  # type: ignore[no-untyped-def]
     for b in range(begin, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
@@ -300,7 +300,7 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
     trees.size[row] = end
 
 
-@njit
+@driver
 def _extend_chunks(first, step, arena, trees, shared, shoots, toward, traits, year, solid, voxel_m):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.trees.metamers import CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
@@ -183,7 +183,7 @@ def _measure_tree(
         out.breast_radius_m[t] = 0.5 * under
 
 
-@njit
+@driver
 def _measure_all(
     first: Any,
     step: Any,
