@@ -42,7 +42,7 @@ from forest.trees.table import Trees
 #: Cycles after which a tree that has not settled is left as it is until next year.
 MOST_PASSES = 80
 #: Turn of a step above which it is shortened, rad: beyond it the linear step means nothing.
-_LONGEST_STEP = 2.0
+_LONGEST_STEP = 0.5
 #: Largest turn of a step at which a tree counts as not moving at all, rad: rounding errors.
 _UNMOVED = 1e-10
 #: Times that a step is halved before the tree is stiffened instead.
@@ -147,13 +147,16 @@ def _swing(tree, work):  # type: ignore[no-untyped-def]
         dx = -work[i, STEP] - work[i, r] * x - work[i, r + 1] * y - work[i, r + 2] * z
         dy = -work[i, STEP + 1] - work[i, r + 3] * x - work[i, r + 4] * y - work[i, r + 5] * z
         dz = -work[i, STEP + 2] - work[i, r + 6] * x - work[i, r + 7] * y - work[i, r + 8] * z
-        x += dx
-        y += dy
-        z += dz
-        work[i, SWING] = x
-        work[i, SWING + 1] = y
-        work[i, SWING + 2] = z
-        largest = max(largest, x * x + y * y + z * z)
+        size = (x + dx) ** 2 + (y + dy) ** 2 + (z + dz) ** 2
+        largest = max(largest, size)
+        if size > _LONGEST_STEP * _LONGEST_STEP:
+            short = _LONGEST_STEP / np.sqrt(size)
+            dx = short * (x + dx) - x
+            dy = short * (y + dy) - y
+            dz = short * (z + dz) - z
+        work[i, SWING] = x + dx
+        work[i, SWING + 1] = y + dy
+        work[i, SWING + 2] = z + dz
         hx, hy, hz = work[i, AXIS], work[i, AXIS + 1], work[i, AXIS + 2]
         lx, ly, lz = work[i, SIDE], work[i, SIDE + 1], work[i, SIDE + 2]
         work[i, STEP] = hx * dx + hy * dy + hz * dz
@@ -216,9 +219,6 @@ def _descend(tree, work, slack):  # type: ignore[no-untyped-def]
     """
     turned, gain = _swing(tree, work)
     part = 1.0
-    if turned > _LONGEST_STEP:
-        part = _LONGEST_STEP / turned
-        gain += _shape(tree, work, part, 1.0)
     tries = 0
     while not gain <= slack:
         before = part

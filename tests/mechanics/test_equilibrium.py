@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from forest._threads import set_threads, threads
+from forest._threads import using_threads
 from forest.mechanics.equilibrium import settle_tree
 from forest.mechanics.work import COLUMNS, STEP, TURN, Chain
 from tests.mechanics.rod_cases import Case, chain, heights, random_case, settled
@@ -154,18 +154,14 @@ def test_rotating_the_world_about_z_rotates_the_result(seed: int, angle: float) 
 
 
 def test_same_bits_for_any_number_of_threads() -> None:
-    before = threads()
     results = []
-    try:
-        for count in (1, 2, 3):
-            set_threads(count)
+    for count in (1, 2, 3):
+        with using_threads(count):
             case = random_case(np.random.default_rng(4), 20, 40, sag=0.3)
             result = settled(case, 1e-4)
-            used = np.concatenate([np.arange(s, s + n) for s, n in _extents(case)])
-            arrays = (case.arena.tip, case.arena.bud, *case.rods)
-            results.append([a[used].tobytes() for a in arrays] + [a.tobytes() for a in result])
-    finally:
-        set_threads(before)
+        used = np.concatenate([np.arange(s, s + n) for s, n in _extents(case)])
+        arrays = (case.arena.tip, case.arena.bud, *case.rods)
+        results.append([a[used].tobytes() for a in arrays] + [a.tobytes() for a in result])
     assert results[0] == results[1] == results[2]
 
 
