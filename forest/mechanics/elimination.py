@@ -18,26 +18,24 @@ from forest._jit import njit
 from forest.mechanics.quaternions import cross
 from forest.mechanics.work import AXIS, FORCE, LEFT_OVER, MOMENT, PULL, SIDE, STEP, TURN
 
+#: Times that a metamer's rigidity is doubled to make the stiffness positive definite.
+_TRIES = np.int64(60)
+
 
 @njit
-def symmetric_inverse(xx, xy, xz, yy, yz, zz):  # type: ignore[no-untyped-def]
-    """Invert a symmetric 3 x 3 matrix; tell whether it is positive definite."""
-    cxx = yy * zz - yz * yz
-    cxy = xz * yz - xy * zz
-    cxz = xy * yz - xz * yy
-    det = xx * cxx + xy * cxy + xz * cxz
+def symmetric_inverse(m):  # type: ignore[no-untyped-def]
+    """Invert a symmetric 3 x 3 matrix (xx, xy, xz, yy, yz, zz); tell if it is positive definite."""
+    xx, xy, xz, yy, yz, zz = m
+    ixx = yy * zz - yz * yz
+    ixy = xz * yz - xy * zz
+    ixz = xy * yz - xz * yy
+    det = xx * ixx + xy * ixy + xz * ixz
     minor = xx * yy - xy * xy
-    sound = xx > 0.0 and minor > 0.0 and det > 0.0
     r = 1.0 / det
-    inverse = (
-        cxx * r,
-        cxy * r,
-        cxz * r,
-        (xx * zz - xz * xz) * r,
-        (xy * xz - xx * yz) * r,
-        minor * r,
-    )
-    return inverse, sound
+    iyy = (xx * zz - xz * xz) * r
+    iyz = (xy * xz - xx * yz) * r
+    inverse = (ixx * r, ixy * r, ixz * r, iyy, iyz, minor * r)
+    return inverse, xx > 0.0 and minor > 0.0 and det > 0.0
 
 
 @njit
@@ -86,25 +84,75 @@ def balance(tree, work, part, stiffer):  # type: ignore[no-untyped-def]
     part : float
         Part of the last STEP that was taken; it is added to TURN.
     stiffer : float
-        Multiple of the rigidity that is added to the stiffness.
+        Multiple of the rigidity that is added to the stiffness of all metamers.
 
     Returns
     -------
     bool
-        Whether the stiffness is positive definite; if not, the scan stopped.
+        Whether the stiffness is positive definite, that is, the tree stable. Where it is not,
+        metamers are taken for stiffer than they are, so that the step leads downhill.
     """
     n = len(tree.parent)
     if part != 0.0:
         for i in range(n):
             for k in range(3):
                 work[i, TURN + k] += part * work[i, STEP + k]
+    stable = True
     for i in range(n - 1, -1, -1):
         if not _eliminate(tree, work, i, 1.0 + stiffer):
-            for j in range(n):
-                for k in range(3):
-                    work[j, STEP + k] = 0.0
-            return False
-    return True
+            stable = False
+    return stable
+
+
+@njit
+def _outer(a, b):  # type: ignore[no-untyped-def]
+    """The symmetric part of a b, twice."""
+    return (
+        2.0 * a[0] * b[0],
+        a[0] * b[1] + a[1] * b[0],
+        a[0] * b[2] + a[2] * b[0],
+        2.0 * a[1] * b[1],
+        a[1] * b[2] + a[2] * b[1],
+        2.0 * a[2] * b[2],
+    )
+
+
+@njit
+def _plus(a, x, b):  # type: ignore[no-untyped-def]
+    """The symmetric matrix a + x b."""
+    return (
+        a[0] + x * b[0],
+        a[1] + x * b[1],
+        a[2] + x * b[2],
+        a[3] + x * b[3],
+        a[4] + x * b[4],
+        a[5] + x * b[5],
+    )
+
+
+@njit
+def _along(h, c, u, v):  # type: ignore[no-untyped-def]
+    """The world vector of components v along H, L, U."""
+    return (
+        v[0] * h[0] + v[1] * c[0] + v[2] * u[0],
+        v[0] * h[1] + v[1] * c[1] + v[2] * u[1],
+        v[0] * h[2] + v[1] * c[2] + v[2] * u[2],
+    )
+
+
+@njit
+def _firm_inverse(rigid, other, stiff):  # type: ignore[no-untyped-def]
+    """Invert stiff * rigid + other, `rigid` doubled until that is positive definite.
+
+    Returns the inverse and whether nothing had to be doubled.
+    """
+    inverse, sound = symmetric_inverse(_plus(other, stiff, rigid))
+    tries = 0
+    while not sound and tries < _TRIES:
+        tries += 1
+        stiff *= 2.0
+        inverse, sound = symmetric_inverse(_plus(other, stiff, rigid))
+    return inverse, tries == 0
 
 
 @njit
@@ -117,81 +165,76 @@ def _eliminate(tree, work, i, stiff):  # type: ignore[no-untyped-def]
     f = (length * work[i, FORCE], length * work[i, FORCE + 1], length * work[i, FORCE + 2])
     t = (work[i, TURN], work[i, TURN + 1], work[i, TURN + 2])
     beyond = (work[i, MOMENT], work[i, MOMENT + 1], work[i, MOMENT + 2])
-    seat = cross(f, h)
-    half = (
-        0.5 * (t[0] * h[0] + t[1] * c[0] + t[2] * u[0]),
-        0.5 * (t[0] * h[1] + t[1] * c[1] + t[2] * u[1]),
-        0.5 * (t[0] * h[2] + t[1] * c[2] + t[2] * u[2]),
-    )
-    finite = _finite_turn(half, seat, beyond)
-    r = 1.0 / length
-    wh = np.float64(tree.rigidity[i, 0]) * r
-    wl = np.float64(tree.rigidity[i, 1]) * r
-    wu = np.float64(tree.rigidity[i, 2]) * r
-    eh = wh * (t[0] - np.float64(tree.rest[i, 0]) * length)
-    el = wl * (t[1] - np.float64(tree.rest[i, 1]) * length)
-    eu = wu * (t[2] - np.float64(tree.rest[i, 2]) * length)
     o = LEFT_OVER
     left = (work[i, o], work[i, o + 1], work[i, o + 2])
-    gx = eh * h[0] + el * c[0] + eu * u[0] + finite[0] + 0.5 * seat[0] + left[0]
-    gy = eh * h[1] + el * c[1] + eu * u[1] + finite[1] + 0.5 * seat[1] + left[1]
-    gz = eh * h[2] + el * c[2] + eu * u[2] + finite[2] + 0.5 * seat[2] + left[2]
+    seat = cross(f, h)
 
-    # P of the pull, A of what lies beyond, S = W + P/4 + A
-    fh = f[0] * h[0] + f[1] * h[1] + f[2] * h[2]
-    pxx = fh - f[0] * h[0]
-    pyy = fh - f[1] * h[1]
-    pzz = fh - f[2] * h[2]
-    pxy = -0.5 * (f[0] * h[1] + f[1] * h[0])
-    pxz = -0.5 * (f[0] * h[2] + f[2] * h[0])
-    pyz = -0.5 * (f[1] * h[2] + f[2] * h[1])
-    a = PULL
-    axx, axy, axz = work[i, a], work[i, a + 1], work[i, a + 2]
-    ayy, ayz, azz = work[i, a + 3], work[i, a + 4], work[i, a + 5]
-    wu *= stiff
-    wh = wh * stiff - wu
-    wl = wl * stiff - wu
-    s, sound = symmetric_inverse(
-        wu + wh * h[0] * h[0] + wl * c[0] * c[0] + 0.25 * pxx + axx,
-        wh * h[0] * h[1] + wl * c[0] * c[1] + 0.25 * pxy + axy,
-        wh * h[0] * h[2] + wl * c[0] * c[2] + 0.25 * pxz + axz,
-        wu + wh * h[1] * h[1] + wl * c[1] * c[1] + 0.25 * pyy + ayy,
-        wh * h[1] * h[2] + wl * c[1] * c[2] + 0.25 * pyz + ayz,
-        wu + wh * h[2] * h[2] + wl * c[2] * c[2] + 0.25 * pzz + azz,
+    # W and the elastic moment; the moment of the loads and what lies beyond
+    wh = np.float64(tree.rigidity[i, 0]) / length
+    wl = np.float64(tree.rigidity[i, 1]) / length
+    wu = np.float64(tree.rigidity[i, 2]) / length
+    rigid = (wu, 0.0, 0.0, wu, 0.0, wu)
+    rigid = _plus(_plus(rigid, 0.5 * (wh - wu), _outer(h, h)), 0.5 * (wl - wu), _outer(c, c))
+    strain = (
+        wh * (t[0] - np.float64(tree.rest[i, 0]) * length),
+        wl * (t[1] - np.float64(tree.rest[i, 1]) * length),
+        wu * (t[2] - np.float64(tree.rest[i, 2]) * length),
     )
-    if not sound:
-        return False
+    elastic = _along(h, c, u, strain)
+    finite = _finite_turn(_along(h, c, u, (0.5 * t[0], 0.5 * t[1], 0.5 * t[2])), seat, beyond)
+    moment = (
+        elastic[0] + finite[0] + 0.5 * seat[0] + left[0],
+        elastic[1] + finite[1] + 0.5 * seat[1] + left[1],
+        elastic[2] + finite[2] + 0.5 * seat[2] + left[2],
+    )
 
-    # columns of C = P/2 + A + [G]/2, then D = S^-1 C
-    mx = 0.5 * beyond[0] + 0.25 * seat[0]
-    my = 0.5 * beyond[1] + 0.25 * seat[1]
-    mz = 0.5 * beyond[2] + 0.25 * seat[2]
-    cx = (0.5 * pxx + axx, 0.5 * pxy + axy + mz, 0.5 * pxz + axz - my)
-    cy = (0.5 * pxy + axy - mz, 0.5 * pyy + ayy, 0.5 * pyz + ayz + mx)
-    cz = (0.5 * pxz + axz + my, 0.5 * pyz + ayz - mx, 0.5 * pzz + azz)
-    g = times(s, (gx, gy, gz))
-    dx = times(s, cx)
-    dy = times(s, cy)
-    dz = times(s, cz)
+    # P, A and the inverse of S = W + P/4 + A
+    fh = _dot(f, h)
+    pull = _plus((fh, 0.0, 0.0, fh, 0.0, fh), -0.5, _outer(f, h))
+    a = PULL
+    carried = (
+        work[i, a],
+        work[i, a + 1],
+        work[i, a + 2],
+        work[i, a + 3],
+        work[i, a + 4],
+        work[i, a + 5],
+    )
+    inverse, sound = _firm_inverse(rigid, _plus(carried, 0.25, pull), stiff)
+
+    # columns of C = P/2 + A + [G]/2; the step is S^-1 (moment + C swing)
+    both = _plus(carried, 0.5, pull)
+    gx = 0.5 * beyond[0] + 0.25 * seat[0]
+    gy = 0.5 * beyond[1] + 0.25 * seat[1]
+    gz = 0.5 * beyond[2] + 0.25 * seat[2]
+    cx = (both[0], both[1] + gz, both[2] - gy)
+    cy = (both[1] - gz, both[3], both[4] + gx)
+    cz = (both[2] + gy, both[4] - gx, both[5])
+    own = times(inverse, moment)
+    dx = times(inverse, cx)
+    dy = times(inverse, cy)
+    dz = times(inverse, cz)
     for k in range(3):
-        work[i, STEP + k] = g[k]
+        work[i, STEP + k] = own[k]
         work[i, a + 3 * k] = dx[k]
         work[i, a + 3 * k + 1] = dy[k]
         work[i, a + 3 * k + 2] = dz[k]
+
     p = tree.parent[i]
     if p >= 0:
-        work[p, a] += pxx + axx - _dot(cx, dx)
-        work[p, a + 1] += pxy + axy - _dot(cx, dy)
-        work[p, a + 2] += pxz + axz - _dot(cx, dz)
-        work[p, a + 3] += pyy + ayy - _dot(cy, dy)
-        work[p, a + 4] += pyz + ayz - _dot(cy, dz)
-        work[p, a + 5] += pzz + azz - _dot(cz, dz)
-        work[p, o] += seat[0] + left[0] - _dot(cx, g)
-        work[p, o + 1] += seat[1] + left[1] - _dot(cy, g)
-        work[p, o + 2] += seat[2] + left[2] - _dot(cz, g)
+        passed = _plus(carried, 1.0, pull)
+        work[p, a] += passed[0] - _dot(cx, dx)
+        work[p, a + 1] += passed[1] - _dot(cx, dy)
+        work[p, a + 2] += passed[2] - _dot(cx, dz)
+        work[p, a + 3] += passed[3] - _dot(cy, dy)
+        work[p, a + 4] += passed[4] - _dot(cy, dz)
+        work[p, a + 5] += passed[5] - _dot(cz, dz)
+        work[p, o] += seat[0] + left[0] - _dot(cx, own)
+        work[p, o + 1] += seat[1] + left[1] - _dot(cy, own)
+        work[p, o + 2] += seat[2] + left[2] - _dot(cz, own)
         for k in range(3):
             work[p, MOMENT + k] += seat[k] + beyond[k]
-    return True
+    return sound
 
 
 @njit

@@ -6,8 +6,8 @@ takes many cycles where branches hang. Here a cycle is one step of Newton's meth
 in the metamers: since a dead load on a chain of rods pulls on each segment's heading alone, the
 stiffness couples a metamer to its parent only. It is eliminated from the tips to the base with the
 moments, and the turns follow from the base to the tips with the frames. A step that would raise
-the energy is shortened. Where a tree is unstable (a stem past Greenhill's load) a multiple of its
-rigidity is added to the stiffness until the step leads downhill.
+the energy is shortened. Where the stiffness is not positive (a stem past Greenhill's load) rigidity
+is added until the step leads downhill.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from forest.trees.table import Trees
 
 #: Cycles after which a tree that has not settled is left as it is until next year.
 MOST_PASSES = 80
-#: Turn of a step above which it is shortened, rad: beyond it the linear step means nothing.
-_LONGEST_STEP = 0.5
+#: Longest turn of a metamer in a step, rad: beyond it the linear step means nothing.
+_LONGEST_STEP = 1.0
 #: Largest turn of a step at which a tree counts as not moving at all, rad: rounding errors.
 _UNMOVED = 1e-10
 #: Times that a step is halved before the tree is stiffened instead.
@@ -257,24 +257,21 @@ def settle_tree(tree, curvature, work, tolerance, most):  # type: ignore[no-unty
     part = 0.0
     turned = np.inf
     passes = 0
+    stable = False
     # Newton's error is the square of its step; the factor is for stems near their buckling load
     # and for metamers that turn by tenths of a radian, where the stiffness is not exact
     near = np.sqrt(0.01 * tolerance)
     while passes < most:
         passes += 1
-        if not balance(tree, work, part, stiffer):
-            _shape(tree, work, 0.0, 0.0)
-            part = 0.0
-            stiffer = max(0.05, 4.0 * stiffer)
-            continue
+        stable = balance(tree, work, part, stiffer) and stiffer == 0.0
         turned, part = _descend(tree, work, slack)
-        if part == 1.0 and (turned <= near if stiffer == 0.0 else turned <= _UNMOVED):
+        if part == 1.0 and turned <= (near if stable else _UNMOVED):
             break
         if part < 0.3:
             stiffer = max(0.2, 4.0 * stiffer)
         elif part == 1.0:
             stiffer = 0.25 * stiffer if stiffer > 0.02 else 0.0
-    return passes, turned, stiffer == 0.0, part
+    return passes, turned, stable, part
 
 
 @njit
@@ -349,8 +346,8 @@ def settle(
     """Bring all trees to equilibrium; change `tip` and `bud`, and the rods' curvature and frame.
 
     Taylor-Hell 2005, eqs 3, 5, 7 and 10 to 12. Rods keep their length. A tree starts from its
-    last curvature. A tree at an unstable equilibrium stays there unless something pushes it: an
-    exactly upright column stands past its Greenhill load, and is not `stable`.
+    last curvature. A column past its Greenhill load stands only if it is upright to the last bit;
+    it is then not `stable`.
 
     Parameters
     ----------
