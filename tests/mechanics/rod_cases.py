@@ -109,7 +109,7 @@ def random_case(
     return case
 
 
-def heights(case: Case, row: int = 0) -> NDArray[np.float32]:
+def tips(case: Case, row: int = 0) -> NDArray[np.float32]:
     """Tips of one tree, m."""
     s = int(case.trees.start[row])
     return case.arena.tip[s : s + int(case.trees.size[row])]

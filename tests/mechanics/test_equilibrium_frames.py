@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from forest.growth.dealing import deal
 from forest.mechanics.rods import frame_new
-from tests.mechanics.rod_cases import chain, heights, random_case, settled
+from tests.mechanics.rod_cases import chain, tips, random_case, settled
 from tests.reference import rods as slow
 
 seeds = st.integers(0, 2**32 - 1)
@@ -73,7 +73,7 @@ def test_tropism_curves_a_new_shoot(pull: float) -> None:
     settled(case)
     # an arc of curvature 0.15 / m and length 1 m
     np.testing.assert_allclose(
-        heights(case)[-1],
+        tips(case)[-1],
         (np.sin(0.15) / 0.15, 0.0, np.sign(pull) * (1.0 - np.cos(0.15)) / 0.15),
         atol=1e-5,
     )
@@ -102,4 +102,4 @@ def test_a_branch_is_turned_by_divergence_and_deviation(
     start = end @ slow.branching(divergence, deviation)
     frame = start @ slow.rotation(0.25 * case.rods.curvature[1].astype(float))
     np.testing.assert_allclose(slow.matrix(case.rods.frame[1]), frame, atol=1e-6)
-    np.testing.assert_allclose(heights(case)[1] - heights(case)[0], 0.5 * frame[:, 0], atol=1e-6)
+    np.testing.assert_allclose(tips(case)[1] - tips(case)[0], 0.5 * frame[:, 0], atol=1e-6)
