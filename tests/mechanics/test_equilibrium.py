@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from forest._threads import using_threads
 from forest.mechanics.equilibrium import settle_tree
 from forest.mechanics.work import COLUMNS, STEP, TURN, Chain
-from tests.mechanics.rod_cases import Case, chain, tips, random_case, settled
+from tests.mechanics.rod_cases import Case, chain, random_case, settled, tips
 from tests.reference import rods as slow
 
 seeds = st.integers(0, 2**32 - 1)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from forest.growth.dealing import deal
 from forest.mechanics.rods import frame_new
-from tests.mechanics.rod_cases import chain, tips, random_case, settled
+from tests.mechanics.rod_cases import chain, random_case, settled, tips
 from tests.reference import rods as slow
 
 seeds = st.integers(0, 2**32 - 1)
