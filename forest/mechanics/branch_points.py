@@ -99,12 +99,19 @@ def weigh_limbs(arena, trees, row, species, work, tips):  # type: ignore[no-unty
         length = np.float64(arena.length[s + i])
         r = wood_radius(arena.pipe[s + i], species.pipe_exponent[sp])
         wood = np.pi * r * r * length * species.green_density[sp]
-        p = arena.parent[s + i]
+        x = np.float64(arena.tip[s + i, 0])
+        y = np.float64(arena.tip[s + i, 1])
+        z = np.float64(arena.tip[s + i, 2])
+        below_x = below_y = below_z = 0.0
+        if i > 0:
+            p = s + arena.parent[s + i]
+            below_x = np.float64(arena.tip[p, 0])
+            below_y = np.float64(arena.tip[p, 1])
+            below_z = np.float64(arena.tip[p, 2])
         work[0, i] = wood + leaves
-        for c in range(3):
-            upper = np.float64(arena.tip[s + i, c])
-            lower = np.float64(arena.tip[s + p, c]) if i > 0 else 0.0
-            work[1 + c, i] = wood * 0.5 * (lower + upper) + leaves * upper
+        work[1, i] = wood * 0.5 * (below_x + x) + leaves * x
+        work[2, i] = wood * 0.5 * (below_y + y) + leaves * y
+        work[3, i] = wood * 0.5 * (below_z + z) + leaves * z
         work[4, i] = length
         tips[i] = i
     for i in range(n - 1, 0, -1):
@@ -117,38 +124,33 @@ def weigh_limbs(arena, trees, row, species, work, tips):  # type: ignore[no-unty
 
 
 @njit
-def _brace(arena, trees, row, species, work, tips, i):  # type: ignore[no-untyped-def]
-    """Give delta and Delta r of the limb whose first metamer is `i`.
+def _brace(work, tip, i, p, end, radius, density):  # type: ignore[no-untyped-def]
+    """Give delta and Delta r of the limb from metamer `i` on parent `p` to metamer `end`.
 
     A limb's direction is that from its base to its tip. The trunk's is the direction from its
     base to the tree's centre of mass: an upright trunk under a crown that leans needs wood too.
     """
-    s = trees.start[row]
-    sp = trees.species[row]
     mass = work[0, i]
     x = y = z = 0.0
-    p = arena.parent[s + i]
     if i > 0:
-        x = np.float64(arena.tip[s + p, 0])
-        y = np.float64(arena.tip[s + p, 1])
-        z = np.float64(arena.tip[s + p, 2])
+        x = np.float64(tip[p, 0])
+        y = np.float64(tip[p, 1])
+        z = np.float64(tip[p, 2])
     centre_x = work[1, i] / mass - x
     centre_y = work[2, i] / mass - y
     along_x = centre_x
     along_y = centre_y
     along_z = work[3, i] / mass - z
     if i > 0:
-        end = s + tips[i]
-        along_x = np.float64(arena.tip[end, 0]) - x
-        along_y = np.float64(arena.tip[end, 1]) - y
-        along_z = np.float64(arena.tip[end, 2]) - z
+        along_x = np.float64(tip[end, 0]) - x
+        along_y = np.float64(tip[end, 1]) - y
+        along_z = np.float64(tip[end, 2]) - z
     flat = np.sqrt(along_x**2 + along_y**2)
     span = np.sqrt(flat**2 + along_z**2)
     lean = flat / span if span > 0.0 else 0.0
     arm = (centre_x * along_x + centre_y * along_y) / flat if flat > 0.0 else 0.0
-    r = wood_radius(arena.pipe[s + i], species.pipe_exponent[sp])
-    supports = SUPPORT * species.green_density[sp] * r * r
-    return support_offset(mass, arm, supports, lean, work[4, i]), widening(r, lean)
+    supports = SUPPORT * density * radius * radius
+    return support_offset(mass, arm, supports, lean, work[4, i]), widening(radius, lean)
 
 
 @njit
@@ -156,6 +158,7 @@ def _shape_rings(arena, trees, row, species, work, tips, rings):  # type: ignore
     """Fill a tree's rows of `rings`; one forward scan after `weigh_limbs`."""
     s = trees.start[row]
     sp = trees.species[row]
+    tip = arena.tip[s : s + np.int64(trees.size[row])]
     turned = 0.0 if species.compression_wood[sp] > 0.0 else np.pi
     reach, widened, along = work[5], work[6], work[7]
     mass = work[0, 0]
@@ -170,7 +173,9 @@ def _shape_rings(arena, trees, row, species, work, tips, rings):  # type: ignore
             widened[i] = widened[p]
             along[i] = along[p] + length
         else:
-            reach[i], widened[i] = _brace(arena, trees, row, species, work, tips, i)
+            r = wood_radius(arena.pipe[s + i], species.pipe_exponent[sp])
+            density = species.green_density[sp]
+            reach[i], widened[i] = _brace(work, tip, i, p, tips[i], r, density)
             along[i] = length
         rings[s + i, 0] = 0.0
         rings[s + i, 1] = 0.0
@@ -179,9 +184,9 @@ def _shape_rings(arena, trees, row, species, work, tips, rings):  # type: ignore
             continue
         hx, hy, hz = centre_x, centre_y, centre_z
         if arena.order[s + i] > 0:
-            hx = np.float64(arena.tip[s + i, 0]) - np.float64(arena.tip[s + p, 0])
-            hy = np.float64(arena.tip[s + i, 1]) - np.float64(arena.tip[s + p, 1])
-            hz = np.float64(arena.tip[s + i, 2]) - np.float64(arena.tip[s + p, 2])
+            hx = np.float64(tip[i, 0]) - np.float64(tip[p, 0])
+            hy = np.float64(tip[i, 1]) - np.float64(tip[p, 1])
+            hz = np.float64(tip[i, 2]) - np.float64(tip[p, 2])
         flat = np.sqrt(hx**2 + hy**2)
         span = np.sqrt(flat**2 + hz**2)
         lean = flat / span if span > 0.0 else 0.0
