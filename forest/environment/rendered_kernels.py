@@ -23,17 +23,18 @@ from forest.environment.rendered_shapes import (
     paint_leaf,
     paint_limb,
 )
-from forest.environment.voxels import count_buds
+from forest.environment.voxels import count_buds, wrap
 
-#: Edge of a tile in pixels.
+#: Edge of a tile in pixels, 2 to the power of SHIFT.
 TILE = 128
+SHIFT = 7
 #: Runs of whole blocks of metamers, of about equal length; fixed, so that nothing depends on the
-#: threads. One more hand holds the obstacles.
+#: threads. One more hand, the last, holds the obstacles.
 HANDS = 16
 #: Kinds of shapes.
-LEAF = np.int64(0)
-LIMB = np.int64(1)
-COLUMN = np.int64(2)
+LEAF = 0
+LIMB = 1
+COLUMN = 2
 
 
 class Walk(NamedTuple):
@@ -121,8 +122,7 @@ def bound_leaves(first, step, metamers, trees, walk, looks, scene, bounds):  # t
                 buds = count_buds(state[k])
                 if buds == 0:
                     continue
-                at_x, at_y, z = x + tip[k, 0], y + tip[k, 1], np.float64(tip[k, 2])
-                spots, _ = leaf_spots(scene, at_x, at_y, z, buds * area)
+                spots, _, _ = _leaf(scene, x, y, tip, k, buds * area)
                 i0 = min(i0, spots[0])
                 i1 = max(i1, spots[1])
                 j0 = min(j0, spots[2])
@@ -134,23 +134,28 @@ def bound_leaves(first, step, metamers, trees, walk, looks, scene, bounds):  # t
 
 
 @inline
+def _leaf(scene: Any, x: Any, y: Any, tip: Any, k: Any, area: Any) -> Any:
+    """Find a leaf's spots, how many pixels it covers, and its height."""
+    z = np.float64(tip[k, 2])
+    spots, covers = leaf_spots(scene, x + tip[k, 0], y + tip[k, 1], z, 0.5 * np.sqrt(area))
+    return spots, covers, z
+
+
+@inline
 def _tiles_along(low: Any, high: Any, n: Any, periodic: Any) -> Any:
     """Find the first tile along an axis that some pixels touch, and how many."""
-    tiles = (n + TILE - 1) // TILE
-    if high < low:
-        return np.int64(0), np.int64(0)
+    tiles = (n + TILE - 1) >> SHIFT
     if not periodic:
         low = max(low, 0)
         high = min(high, n - 1)
-        return low // TILE, max(high // TILE - low // TILE + 1, 0) if high >= low else np.int64(0)
+        return low >> SHIFT, max((high >> SHIFT) - (low >> SHIFT) + 1, 0) * (high >= low)
     if high - low >= n - 1:
         return np.int64(0), tiles
-    begin = low % n
-    end = high % n
-    count = end // TILE - begin // TILE + 1
-    if end < begin:
-        count += tiles
-    return begin // TILE, min(count, tiles)
+    begin = wrap(low, n)
+    end = begin + high - low
+    if end < n:
+        return begin >> SHIFT, (end >> SHIFT) - (begin >> SHIFT) + 1
+    return begin >> SHIFT, min(((end - n) >> SHIFT) - (begin >> SHIFT) + 1 + tiles, tiles)
 
 
 @inline
@@ -158,10 +163,12 @@ def _enter(
     spots: Any, scene: Any, cursor: Any, hand: Any, owner: Any, item: Any, tree: Any, name: Any
 ) -> None:
     """Name a shape for every tile that it touches; only count them while there is no room."""
+    if spots[1] < spots[0] or spots[3] < spots[2]:
+        return
     i, across = _tiles_along(spots[0], spots[1], scene.wide, scene.periodic)
     j, down = _tiles_along(spots[2], spots[3], scene.deep, scene.periodic)
-    tiles_x = (scene.wide + TILE - 1) // TILE
-    tiles_y = (scene.deep + TILE - 1) // TILE
+    tiles_x = (scene.wide + TILE - 1) >> SHIFT
+    tiles_y = (scene.deep + TILE - 1) >> SHIFT
     for b in range(j, j + down):
         row = b - tiles_y if b >= tiles_y else b
         for a in range(i, i + across):
@@ -174,150 +181,121 @@ def _enter(
 
 
 @njit
-def _enter_block(metamers, trees, walk, block, looks, scene, radius, entries, hand):  # type: ignore[no-untyped-def]
-    """Name the leaves and internodes of a block."""
-    # Arrays are taken out of their tuples before the loop: each access would count references.
-    state = metamers.state
-    tip = metamers.tip
-    parents = metamers.parent
-    cursor, owner, item = entries.cursor, entries.tree, entries.item
-    tree = walk.tree[block]
-    start = trees.start[tree]
-    area = looks.leaf_area_m2[trees.species[tree]]
-    x, y = trees.x[tree], trees.y[tree]
-    for k in range(walk.first[block], walk.last[block]):
-        buds = count_buds(state[k])
-        if buds > 0:
-            at_x, at_y, z = x + tip[k, 0], y + tip[k, 1], np.float64(tip[k, 2])
-            spots, _ = leaf_spots(scene, at_x, at_y, z, buds * area)
-            _enter(spots, scene, cursor, hand, owner, item, tree, k - start)
-        parent = np.int64(parents[k])
-        if parent >= 0:
-            parent += start
-        ends = limb_ends(scene, x, y, tip, parent, k)
-        spots = limb_spots(scene, ends, np.float64(radius[k]))
-        _enter(spots, scene, cursor, hand, owner, item, tree, -1 - (k - start))
-
-
-@njit
 def enter(first, step, metamers, trees, walk, looks, scene, radius, columns, entries):  # type: ignore[no-untyped-def]
     """Name all shapes for the tiles that they touch; only count them while there is no room."""
-    for hand in range(first, HANDS + 1, step):
-        if hand < HANDS:
-            for block in range(walk.cut[hand], walk.cut[hand + 1]):
-                _enter_block(metamers, trees, walk, block, looks, scene, radius, entries, hand)
-            continue
+    # Arrays are taken out of their tuples before the loops: each access would count references.
+    state, tip, parents = metamers.state, metamers.tip, metamers.parent
+    cursor, owner, item = entries.cursor, entries.tree, entries.item
+    for hand in range(first, HANDS, step):
+        for block in range(walk.cut[hand], walk.cut[hand + 1]):
+            tree = walk.tree[block]
+            start = trees.start[tree]
+            area = looks.leaf_area_m2[trees.species[tree]]
+            x, y = trees.x[tree], trees.y[tree]
+            for k in range(walk.first[block], walk.last[block]):
+                buds = count_buds(state[k])
+                if buds > 0:
+                    spots, _, _ = _leaf(scene, x, y, tip, k, buds * area)
+                    _enter(spots, scene, cursor, hand, owner, item, tree, k - start)
+                parent = start + parents[k] if parents[k] >= 0 else np.int64(-1)
+                ends = limb_ends(scene, x, y, tip, parent, k)
+                spots = limb_spots(scene, ends, np.float64(radius[k]))
+                _enter(spots, scene, cursor, hand, owner, item, tree, start - k - 1)
+    if first == 0:
         for c in range(len(columns.x)):
-            _enter(
-                column_spots(scene, columns, c),
-                scene,
-                entries.cursor,
-                hand,
-                entries.tree,
-                entries.item,
-                np.int64(-1),
-                np.int64(c),
-            )
+            spots = column_spots(scene, columns, c)
+            _enter(spots, scene, cursor, HANDS, owner, item, np.int64(-1), np.int64(c))
 
 
 @inline
-def _shifts(low: Any, high: Any, begin: Any, end: Any, n: Any, periodic: Any) -> Any:
-    """Find how many turns of a torus bring pixels low..high into begin..end - 1."""
-    if not periodic or (low >= 0 and high < n):
-        return np.int64(0), np.int64(0)
-    return -((end - 1 - low) // n), (high - begin) // n
-
-
-@njit
-def _draw_entry(  # type: ignore[no-untyped-def]
-    depth, who, tile, name, spots, scene, kind, ends, radius, columns, column
-):
-    """Draw one shape into a tile; a leaf stands at the height ends[5]."""
-    i0, i1, j0, j1 = spots
-    x0, x1, y0, y1 = tile
-    low_i, high_i = _shifts(i0, i1, x0, x1, scene.wide, scene.periodic)
-    low_j, high_j = _shifts(j0, j1, y0, y1, scene.deep, scene.periodic)
-    for turn_j in range(low_j, high_j + 1):
-        for turn_i in range(low_i, high_i + 1):
-            over_i = turn_i * scene.wide
-            over_j = turn_j * scene.deep
-            part = (
-                max(i0, x0 + over_i),
-                min(i1, x1 - 1 + over_i),
-                max(j0, y0 + over_j),
-                min(j1, y1 - 1 + over_j),
-            )
-            corner = x0 + over_i, y0 + over_j
-            if kind == LEAF:
-                paint_leaf(depth, who, name, part, corner, ends[5])
-            elif kind == LIMB:
-                paint_limb(depth, who, name, part, corner, scene, ends, radius)
-            else:
-                paint_column(depth, who, name, part, corner, scene, columns, column)
+def _turns(spots: Any, tile: Any, scene: Any) -> Any:
+    """Find how many turns of the torus bring spots into a tile: least and most along x, along y."""
+    low_i = high_i = low_j = high_j = np.int64(0)
+    if scene.periodic:
+        if spots[0] < 0 or spots[1] >= scene.wide:
+            low_i = -((tile[1] - 1 - spots[0]) // scene.wide)
+            high_i = (spots[1] - tile[0]) // scene.wide
+        if spots[2] < 0 or spots[3] >= scene.deep:
+            low_j = -((tile[3] - 1 - spots[2]) // scene.deep)
+            high_j = (spots[3] - tile[2]) // scene.deep
+    return low_i, high_i, low_j, high_j
 
 
 @inline
-def _leaf(metamers: Any, trees: Any, looks: Any, scene: Any, tree: Any, k: Any) -> Any:
-    """Find a leaf's spots, how many pixels it covers, and its height."""
-    area = count_buds(metamers.state[k]) * looks.leaf_area_m2[trees.species[tree]]
-    at_x = trees.x[tree] + metamers.tip[k, 0]
-    at_y = trees.y[tree] + metamers.tip[k, 1]
-    z = np.float64(metamers.tip[k, 2])
-    spots, covers = leaf_spots(scene, at_x, at_y, z, area)
-    return spots, covers, z
+def _part(spots: Any, tile: Any, over_i: Any, over_j: Any) -> Any:
+    """Cut spots to those that lie in a tile after some turns; give the tile's corner there, too."""
+    i0, j0 = tile[0] + over_i, tile[2] + over_j
+    part = (
+        max(spots[0], i0),
+        min(spots[1], tile[1] - 1 + over_i),
+        max(spots[2], j0),
+        min(spots[3], tile[3] - 1 + over_j),
+    )
+    return part, (i0, j0)
 
 
 @njit
 def _draw_shapes(depth, who, tile, span, metamers, trees, looks, scene, radius, columns, entries):  # type: ignore[no-untyped-def]
-    """Draw the shapes of one tile's entries; a name is the entry's place among them."""
-    nowhere = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Draw the shapes of one tile's entries; a name is the entry's place among them.
+
+    A leaf between all pixels' centres is not drawn; its count is set to -1.
+    """
+    state, tip, parents = metamers.state, metamers.tip, metamers.parent
+    owner, items, seen = entries.tree, entries.item, entries.seen
+    tree_x, tree_y, starts, species = trees.x, trees.y, trees.start, trees.species
+    leaf_area = looks.leaf_area_m2
     for e in range(span[0], span[1]):
-        tree = np.int64(entries.tree[e])
-        item = np.int64(entries.item[e])
-        name = np.int32(e - span[0])
-        if tree < 0:
-            spots = column_spots(scene, columns, item)
-            _draw_entry(depth, who, tile, name, spots, scene, COLUMN, nowhere, 0.0, columns, item)
-        elif item >= 0:
-            k = trees.start[tree] + item
-            spots, covers, z = _leaf(metamers, trees, looks, scene, tree, k)
-            if covers > 0:
-                ends = (0.0, 0.0, z, 0.0, 0.0, z)
-                _draw_entry(depth, who, tile, name, spots, scene, LEAF, ends, 0.0, columns, item)
-        else:
-            k = trees.start[tree] - 1 - item
-            parent = np.int64(metamers.parent[k])
-            if parent >= 0:
-                parent += trees.start[tree]
-            ends = limb_ends(scene, trees.x[tree], trees.y[tree], metamers.tip, parent, k)
+        tree, item, name = np.int64(owner[e]), np.int64(items[e]), np.int32(e - span[0])
+        seen[e] = 0
+        kind = COLUMN if tree < 0 else LEAF if item >= 0 else LIMB
+        z = thick = 0.0
+        ends = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if kind == LEAF:
+            k = starts[tree] + item
+            area = count_buds(state[k]) * leaf_area[species[tree]]
+            spots, covers, z = _leaf(scene, tree_x[tree], tree_y[tree], tip, k, area)
+            if covers == 0:
+                seen[e] = -1
+                continue
+        elif kind == LIMB:
+            k = starts[tree] - 1 - item
+            parent = starts[tree] + parents[k] if parents[k] >= 0 else np.int64(-1)
+            ends = limb_ends(scene, tree_x[tree], tree_y[tree], tip, parent, k)
             thick = np.float64(radius[k])
             spots = limb_spots(scene, ends, thick)
-            _draw_entry(depth, who, tile, name, spots, scene, LIMB, ends, thick, columns, item)
+        else:
+            spots = column_spots(scene, columns, item)
+        low_i, high_i, low_j, high_j = _turns(spots, tile, scene)
+        for turn_j in range(low_j, high_j + 1):
+            for turn_i in range(low_i, high_i + 1):
+                part, corner = _part(spots, tile, turn_i * scene.wide, turn_j * scene.deep)
+                if kind == LEAF:
+                    paint_leaf(depth, who, name, part, corner, z)
+                elif kind == LIMB:
+                    paint_limb(depth, who, name, part, corner, scene, ends, thick)
+                else:
+                    paint_column(depth, who, name, part, corner, scene, columns, item)
 
 
 @njit
-def _count_seen(depth, who, tile, span, metamers, trees, looks, scene, entries):  # type: ignore[no-untyped-def]
+def _count_seen(depth, who, tile, span, metamers, trees, scene, entries):  # type: ignore[no-untyped-def]
     """Count the pixels of each entry; a leaf between all centres sees what its pixel holds."""
-    seen = entries.seen
-    for e in range(span[0], span[1]):
-        seen[e] = 0
+    owner, items, seen = entries.tree, entries.item, entries.seen
     for j in range(tile[3] - tile[2]):
         for i in range(tile[1] - tile[0]):
             if who[j, i] >= 0:
                 seen[span[0] + who[j, i]] += 1
     for e in range(span[0], span[1]):
-        tree = np.int64(entries.tree[e])
-        item = np.int64(entries.item[e])
-        if tree < 0 or item < 0:
+        if seen[e] >= 0:
             continue
-        k = trees.start[tree] + item
-        spots, covers, z = _leaf(metamers, trees, looks, scene, tree, k)
-        if covers == 0:
-            i, j = spots[0], spots[2]
-            if scene.periodic:
-                i %= scene.wide
-                j %= scene.deep
-            seen[e] = 1 if depth[j - tile[2], i - tile[0]] <= np.float32(z) else 0
+        tree = owner[e]
+        k = trees.start[tree] + items[e]
+        spots, _, z = _leaf(scene, trees.x[tree], trees.y[tree], metamers.tip, k, 0.0)
+        i, j = spots[0], spots[2]
+        if scene.periodic:
+            i = wrap(i, scene.wide)
+            j = wrap(j, scene.deep)
+        seen[e] = 1 if depth[j - tile[2], i - tile[0]] <= np.float32(z) else 0
 
 
 @njit
@@ -325,7 +303,7 @@ def draw(first, step, metamers, trees, looks, scene, radius, columns, entries): 
     """Draw every tile and count the pixels of every entry."""
     depth = np.empty((TILE, TILE), np.float32)
     who = np.empty((TILE, TILE), np.int32)
-    tiles_x = (scene.wide + TILE - 1) // TILE
+    tiles_x = (scene.wide + TILE - 1) >> SHIFT
     for tile in range(first, entries.cursor.shape[1], step):
         span = entries.begin[tile * (HANDS + 1)], entries.begin[(tile + 1) * (HANDS + 1)]
         if span[0] == span[1]:
@@ -337,7 +315,7 @@ def draw(first, step, metamers, trees, looks, scene, radius, columns, entries): 
         _draw_shapes(
             depth, who, place, span, metamers, trees, looks, scene, radius, columns, entries
         )
-        _count_seen(depth, who, place, span, metamers, trees, looks, scene, entries)
+        _count_seen(depth, who, place, span, metamers, trees, scene, entries)
 
 
 @inline
@@ -365,25 +343,25 @@ def gather(  # type: ignore[no-untyped-def]
     first, step, metamers, trees, walk, looks, scene, entries, count, clearing, share
 ):
     """Add `share` times the part of each leaf that is seen to the node's light."""
-    light = metamers.light
-    tiles = entries.cursor.shape[1]
+    light, state, tip = metamers.light, metamers.state, metamers.tip
+    begin, owner, items, seen = entries.begin, entries.tree, entries.item, entries.seen
+    starts = trees.start
     for hand in range(first, HANDS, step):
-        for tile in range(tiles):
-            at = tile * (HANDS + 1) + hand
-            for e in range(entries.begin[at], entries.begin[at + 1]):
-                if entries.item[e] >= 0:
-                    k = trees.start[entries.tree[e]] + entries.item[e]
-                    count[k] += entries.seen[e]
+        for at in range(hand, len(begin) - 1, HANDS + 1):
+            for e in range(begin[at], begin[at + 1]):
+                if items[e] >= 0:
+                    count[starts[owner[e]] + items[e]] += seen[e]
         for block in range(walk.cut[hand], walk.cut[hand + 1]):
             tree = walk.tree[block]
             x, y = trees.x[tree], trees.y[tree]
+            area = looks.leaf_area_m2[trees.species[tree]]
             for k in range(walk.first[block], walk.last[block]):
                 if count[k] == 0:
                     continue
-                _, covers, z = _leaf(metamers, trees, looks, scene, tree, k)
-                if _is_open(scene, clearing, x + metamers.tip[k, 0], y + metamers.tip[k, 1], z):
-                    seen = np.float64(count[k]) / np.float64(max(covers, 1))
-                    light[k] = np.float32(np.float64(light[k]) + share * seen)
+                _, covers, z = _leaf(scene, x, y, tip, k, count_buds(state[k]) * area)
+                if _is_open(scene, clearing, x + tip[k, 0], y + tip[k, 1], z):
+                    part = np.float64(count[k]) / np.float64(max(covers, 1))
+                    light[k] = np.float32(np.float64(light[k]) + share * part)
                 count[k] = 0
 
 

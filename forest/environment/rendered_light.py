@@ -156,10 +156,9 @@ class RenderedLight:
             dy,
             float(np.hypot(1.0, dx / dz)),
             float(np.hypot(1.0, dy / dz)),
-            *self._pixel,
+            1.0 / self._pixel[0],
+            1.0 / self._pixel[1],
             *shift,
-            0,
-            0,
             *self._window,
             int(self._periodic),
         )
@@ -169,7 +168,9 @@ class RenderedLight:
         in_threads(bound_leaves, metamers, trees, walk, self._looks, scene, bounds)
         i0, j0 = (int(bounds[:, axis].min()) for axis in (0, 2))
         i1, j1 = (int(bounds[:, axis].max()) for axis in (1, 3))
-        return scene._replace(first_x=i0, first_y=j0, wide=i1 - i0 + 1, deep=j1 - j0 + 1)
+        return scene._replace(
+            shift_x=shift[0] + i0, shift_y=shift[1] + j0, wide=i1 - i0 + 1, deep=j1 - j0 + 1
+        )
 
     def _enter(self, metamers: Metamers, trees: Trees, walk: Walk, scene: Scene) -> Entries:
         """Count the shapes of each tile, then name them in their order."""

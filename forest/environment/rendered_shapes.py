@@ -31,12 +31,12 @@ class Scene(NamedTuple):
         Horizontal parts of the unit vector towards the light.
     stretch_x, stretch_y : float
         Half the extents along x and y of the image of a ball of radius 1.
-    pixel_x, pixel_y : float
-        Edges of a pixel, m.
+    per_x, per_y : float
+        Pixels per metre.
     shift_x, shift_y : float
-        Place of pixel 0's centre, pixels.
-    first_x, first_y, wide, deep : int
-        First pixel and number of pixels of the window.
+        Place of the centre of the window's first pixel, pixels.
+    wide, deep : int
+        Number of pixels of the window.
     periodic : int
         1 where the window is the whole torus.
     """
@@ -47,12 +47,10 @@ class Scene(NamedTuple):
     toward_y: float
     stretch_x: float
     stretch_y: float
-    pixel_x: float
-    pixel_y: float
+    per_x: float
+    per_y: float
     shift_x: float
     shift_y: float
-    first_x: int
-    first_y: int
     wide: int
     deep: int
     periodic: int
@@ -69,36 +67,28 @@ class Columns(NamedTuple):
 
 
 @inline
-def _first(at: Any, pixel: Any, shift: Any) -> Any:
-    """Find the first pixel whose centre is not before `at`."""
-    return np.int64(np.ceil(at / pixel - shift))
+def _between(low: Any, high: Any, per: Any, shift: Any) -> Any:
+    """Find the pixels whose centres lie in [low, high)."""
+    return np.int64(np.ceil(low * per - shift)), np.int64(np.ceil(high * per - shift)) - 1
 
 
 @inline
-def _between(low: Any, high: Any, pixel: Any, shift: Any, first: Any) -> Any:
-    """Find the pixels whose centres lie in [low, high), counted from the window's first."""
-    begin = _first(low, pixel, shift)
-    return begin - first, _first(high, pixel, shift) - 1 - first
-
-
-@inline
-def leaf_spots(scene: Any, x: Any, y: Any, z: Any, area: Any) -> Any:
-    """Find the spots of a horizontal square leaf, and how many pixels it covers.
+def leaf_spots(scene: Any, x: Any, y: Any, z: Any, half: Any) -> Any:
+    """Find the spots of a horizontal square leaf of half the edge, and how many pixels it covers.
 
     A leaf between all centres covers none; its spots are then the pixel that it is nearest to.
     """
-    half = 0.5 * np.sqrt(area)
     u = x - z * scene.slope_x
     v = y - z * scene.slope_y
-    i0, i1 = _between(u - half, u + half, scene.pixel_x, scene.shift_x, scene.first_x)
-    j0, j1 = _between(v - half, v + half, scene.pixel_y, scene.shift_y, scene.first_y)
+    i0, i1 = _between(u - half, u + half, scene.per_x, scene.shift_x)
+    j0, j1 = _between(v - half, v + half, scene.per_y, scene.shift_y)
     if scene.periodic:
         i1 = min(i1, i0 + scene.wide - 1)
         j1 = min(j1, j0 + scene.deep - 1)
     if i1 >= i0 and j1 >= j0:
         return (i0, i1, j0, j1), (i1 - i0 + 1) * (j1 - j0 + 1)
-    i0 = np.int64(np.floor(u / scene.pixel_x - scene.shift_x + 0.5)) - scene.first_x
-    j0 = np.int64(np.floor(v / scene.pixel_y - scene.shift_y + 0.5)) - scene.first_y
+    i0 = np.int64(np.floor(u * scene.per_x - scene.shift_x + 0.5))
+    j0 = np.int64(np.floor(v * scene.per_y - scene.shift_y + 0.5))
     return (i0, i0, j0, j0), np.int64(0)
 
 
@@ -110,56 +100,33 @@ def limb_ends(scene: Any, x: Any, y: Any, tip: Any, parent: Any, k: Any) -> Any:
         x0 += np.float64(tip[parent, 0])
         y0 += np.float64(tip[parent, 1])
         z0 += np.float64(tip[parent, 2])
-    z1 = np.float64(tip[k, 2])
     x1 = x + np.float64(tip[k, 0])
     y1 = y + np.float64(tip[k, 1])
-    return (
-        x0 - z0 * scene.slope_x,
-        y0 - z0 * scene.slope_y,
-        z0,
-        x1 - z1 * scene.slope_x,
-        y1 - z1 * scene.slope_y,
-        z1,
-    )
+    z1 = np.float64(tip[k, 2])
+    u0, v0 = x0 - z0 * scene.slope_x, y0 - z0 * scene.slope_y
+    return u0, v0, z0, x1 - z1 * scene.slope_x, y1 - z1 * scene.slope_y, z1
 
 
 @inline
 def limb_spots(scene: Any, ends: Any, radius: Any) -> Any:
     """Bound the pixels of an internode, a capsule around the line between its ends."""
     u0, v0, _, u1, v1, _ = ends
-    pad = radius * scene.stretch_x
-    i0, i1 = _between(
-        min(u0, u1) - pad, max(u0, u1) + pad, scene.pixel_x, scene.shift_x, scene.first_x
-    )
-    pad = radius * scene.stretch_y
-    j0, j1 = _between(
-        min(v0, v1) - pad, max(v0, v1) + pad, scene.pixel_y, scene.shift_y, scene.first_y
-    )
+    pad_x = radius * scene.stretch_x
+    pad_y = radius * scene.stretch_y
+    i0, i1 = _between(min(u0, u1) - pad_x, max(u0, u1) + pad_x, scene.per_x, scene.shift_x)
+    j0, j1 = _between(min(v0, v1) - pad_y, max(v0, v1) + pad_y, scene.per_y, scene.shift_y)
     return i0, i1, j0, j1
 
 
 @inline
 def column_spots(scene: Any, columns: Any, c: Any) -> Any:
     """Bound the pixels of a column."""
-    u0 = columns.foot[c] * scene.slope_x
-    u1 = columns.top[c] * scene.slope_x
-    v0 = columns.foot[c] * scene.slope_y
-    v1 = columns.top[c] * scene.slope_y
+    u0, u1 = columns.foot[c] * scene.slope_x, columns.top[c] * scene.slope_x
+    v0, v1 = columns.foot[c] * scene.slope_y, columns.top[c] * scene.slope_y
     x, y = columns.x[c], columns.y[c]
-    i0, i1 = _between(
-        x - max(u0, u1),
-        x + columns.edge - min(u0, u1),
-        scene.pixel_x,
-        scene.shift_x,
-        scene.first_x,
-    )
-    j0, j1 = _between(
-        y - max(v0, v1),
-        y + columns.edge - min(v0, v1),
-        scene.pixel_y,
-        scene.shift_y,
-        scene.first_y,
-    )
+    right, back = x + columns.edge, y + columns.edge
+    i0, i1 = _between(x - max(u0, u1), right - min(u0, u1), scene.per_x, scene.shift_x)
+    j0, j1 = _between(y - max(v0, v1), back - min(v0, v1), scene.per_y, scene.shift_y)
     return i0, i1, j0, j1
 
 
@@ -179,23 +146,22 @@ def paint_leaf(depth: Any, who: Any, name: Any, part: Any, corner: Any, z: Any) 
 
 
 @inline
-def _limb_row(scene: Any, ends: Any, radius: Any, v: Any) -> Any:
-    """Bound the pixels of an internode in the row at `v`."""
+def _strip(ends: Any, along_d: Any, square: Any, radius: Any, scene: Any) -> Any:
+    """Describe where an internode's line crosses rows of pixels.
+
+    Returns the line's place in row 0 and its step per row, pixels, and half the width, in pixels
+    and along a row, of the strip within the radius of the line; endless for a line along the row.
+    """
     u0, v0, _, u1, v1, _ = ends
-    pad = radius * scene.stretch_y
-    a, b = 0.0, 1.0
-    if abs(v1 - v0) > pad:
-        ta = (v - pad - v0) / (v1 - v0)
-        tb = (v + pad - v0) / (v1 - v0)
-        a = min(max(min(ta, tb), 0.0), 1.0)
-        b = min(max(max(ta, tb), 0.0), 1.0)
-    ua = u0 + a * (u1 - u0)
-    ub = u0 + b * (u1 - u0)
-    # A little wider than needed, for rounding: every pixel is tried below.
-    pad = radius * scene.stretch_x * (1.0 + 1e-9) + 1e-9
-    return _between(
-        min(ua, ub) - pad, max(ua, ub) + pad, scene.pixel_x, scene.shift_x, scene.first_x
-    )
+    endless = 1e9
+    seen = u1 - u0 - scene.toward_x * along_d
+    width = (1.0 - scene.toward_x * scene.toward_x) * square - seen * seen
+    if abs(v1 - v0) * endless <= abs(u1 - u0) or width <= 1e-9 * square:
+        return 0.0, 0.0, endless
+    step = (u1 - u0) / (v1 - v0) * scene.per_x / scene.per_y
+    at = u0 * scene.per_x - scene.shift_x - step * (v0 * scene.per_y - scene.shift_y)
+    # A little wider than needed, for rounding: every pixel is tried.
+    return at, step, radius * scene.per_x * np.sqrt(square / width) + 1e-6
 
 
 @inline
@@ -221,21 +187,25 @@ def paint_limb(
     along_d = along_u * dx + along_v * dy
     flat = along_u * along_u + along_v * along_v
     square = flat - along_d * along_d
+    upright = square <= 1e-12 * flat
+    inverse = 0.0 if upright else 1.0 / square
+    begin, step, half = _strip(ends, along_d, square, radius, scene)
+    edge_x, edge_y = 1.0 / scene.per_x, 1.0 / scene.per_y
     for j in range(part[2], part[3] + 1):
-        v = (j + scene.first_y + scene.shift_y) * scene.pixel_y
-        i0, i1 = _limb_row(scene, ends, radius, v)
-        for i in range(max(i0, part[0]), min(i1, part[1]) + 1):
-            off_u = (i + scene.first_x + scene.shift_x) * scene.pixel_x - u0
-            off_v = v - v0
-            if square > 1e-12 * flat:
-                seen = off_u * along_u + off_v * along_v - (off_u * dx + off_v * dy) * along_d
-                t = min(max(seen / square, 0.0), 1.0)
-            else:
+        off_v = (j + scene.shift_y) * edge_y - v0
+        at = begin + j * step
+        i0 = max(np.int64(np.ceil(at - half)), part[0])
+        i1 = min(np.int64(np.floor(at + half)), part[1])
+        for i in range(i0, i1 + 1):
+            off_u = (i + scene.shift_x) * edge_x - u0
+            seen = off_u * along_u + off_v * along_v - (off_u * dx + off_v * dy) * along_d
+            t = min(max(seen * inverse, 0.0), 1.0)
+            if upright:
                 t = 1.0 if z1 >= z0 else 0.0
-            off_u -= t * along_u
-            off_v -= t * along_v
-            off_d = off_u * dx + off_v * dy
-            if off_u * off_u + off_v * off_v - off_d * off_d > radius * radius:
+            rest_u = off_u - t * along_u
+            rest_v = off_v - t * along_v
+            rest_d = rest_u * dx + rest_v * dy
+            if rest_u * rest_u + rest_v * rest_v - rest_d * rest_d > radius * radius:
                 continue
             near = np.float32((1.0 - t) * z0 + t * z1)
             if near > depth[j - corner[1], i - corner[0]]:
@@ -267,24 +237,19 @@ def paint_column(
     c: Any,
 ) -> None:
     """Draw a column into a tile, at the height where each ray leaves it."""
+    x, y, edge = columns.x[c], columns.y[c], columns.edge
     for j in range(part[2], part[3] + 1):
-        v = (j + scene.first_y + scene.shift_y) * scene.pixel_y
-        foot, top = _stay(
-            v, scene.slope_y, columns.y[c], columns.edge, columns.foot[c], columns.top[c]
-        )
+        v = (j + scene.shift_y) / scene.per_y
+        foot, top = _stay(v, scene.slope_y, y, edge, columns.foot[c], columns.top[c])
         if foot > top:
             continue
-        ends = foot * scene.slope_x, top * scene.slope_x
-        i0, i1 = _between(
-            columns.x[c] - max(ends[0], ends[1]) - 1e-9,
-            columns.x[c] + columns.edge - min(ends[0], ends[1]) + 1e-9,
-            scene.pixel_x,
-            scene.shift_x,
-            scene.first_x,
-        )
+        u0, u1 = foot * scene.slope_x, top * scene.slope_x
+        # A little wider than needed, for rounding: every pixel is tried.
+        low, high = x - max(u0, u1) - 1e-9, x + edge - min(u0, u1) + 1e-9
+        i0, i1 = _between(low, high, scene.per_x, scene.shift_x)
         for i in range(max(i0, part[0]), min(i1, part[1]) + 1):
-            u = (i + scene.first_x + scene.shift_x) * scene.pixel_x
-            low, high = _stay(u, scene.slope_x, columns.x[c], columns.edge, foot, top)
+            u = (i + scene.shift_x) / scene.per_x
+            low, high = _stay(u, scene.slope_x, x, edge, foot, top)
             near = np.float32(high)
             if low <= high and near > depth[j - corner[1], i - corner[0]]:
                 depth[j - corner[1], i - corner[0]] = near
