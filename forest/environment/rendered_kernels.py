@@ -35,6 +35,9 @@ HANDS = 16
 LEAF = 0
 LIMB = 1
 COLUMN = 2
+#: Tiles that a shape touches, where it is not just one.
+NONE = -1
+SEVERAL = -2
 
 
 class Walk(NamedTuple):
@@ -159,6 +162,23 @@ def _tiles_along(low: Any, high: Any, n: Any, periodic: Any) -> Any:
 
 
 @inline
+def _only_tile(spots: Any, wide: Any, deep: Any, periodic: Any) -> Any:
+    """Find the one tile that holds all spots, else NONE or SEVERAL (as far as is easily told)."""
+    i, j = spots[0], spots[2]
+    if spots[1] < i or spots[3] < j:
+        return np.int64(NONE)
+    if periodic:
+        i = wrap(i, wide)
+        j = wrap(j, deep)
+    right, back = i + spots[1] - spots[0], j + spots[3] - spots[2]
+    if i < 0 or j < 0 or right >= wide or back >= deep:
+        return np.int64(SEVERAL)
+    if i >> SHIFT != right >> SHIFT or j >> SHIFT != back >> SHIFT:
+        return np.int64(SEVERAL)
+    return (j >> SHIFT) * ((wide + TILE - 1) >> SHIFT) + (i >> SHIFT)
+
+
+@inline
 def _enter(
     spots: Any, scene: Any, cursor: Any, hand: Any, owner: Any, item: Any, tree: Any, name: Any
 ) -> None:
@@ -186,21 +206,35 @@ def enter(first, step, metamers, trees, walk, looks, scene, radius, columns, ent
     # Arrays are taken out of their tuples before the loops: each access would count references.
     state, tip, parents = metamers.state, metamers.tip, metamers.parent
     cursor, owner, item = entries.cursor, entries.tree, entries.item
+    wide, deep, periodic = scene.wide, scene.deep, scene.periodic
+    filling = len(owner) > 0
     for hand in range(first, HANDS, step):
         for block in range(walk.cut[hand], walk.cut[hand + 1]):
             tree = walk.tree[block]
             start = trees.start[tree]
             area = looks.leaf_area_m2[trees.species[tree]]
             x, y = trees.x[tree], trees.y[tree]
-            for k in range(walk.first[block], walk.last[block]):
-                buds = count_buds(state[k])
-                if buds > 0:
-                    spots, _, _ = _leaf(scene, x, y, tip, k, buds * area)
-                    _enter(spots, scene, cursor, hand, owner, item, tree, k - start)
-                parent = start + parents[k] if parents[k] >= 0 else np.int64(-1)
-                ends = limb_ends(scene, x, y, tip, parent, k)
-                spots = limb_spots(scene, ends, np.float64(radius[k]))
-                _enter(spots, scene, cursor, hand, owner, item, tree, start - k - 1)
+            for shape in range(2 * walk.first[block], 2 * walk.last[block]):
+                k = shape >> 1
+                if shape & 1:
+                    name = start - k - 1
+                    parent = start + parents[k] if parents[k] >= 0 else np.int64(-1)
+                    ends = limb_ends(scene, x, y, tip, parent, k)
+                    spots = limb_spots(scene, ends, np.float64(radius[k]))
+                elif count_buds(state[k]) > 0:
+                    name = k - start
+                    spots, _, _ = _leaf(scene, x, y, tip, k, count_buds(state[k]) * area)
+                else:
+                    continue
+                tile = _only_tile(spots, wide, deep, periodic)
+                if tile >= 0:
+                    at = cursor[hand, tile]
+                    cursor[hand, tile] = at + 1
+                    if filling:
+                        owner[at] = tree
+                        item[at] = name
+                elif tile == SEVERAL:
+                    _enter(spots, scene, cursor, hand, owner, item, tree, name)
     if first == 0:
         for c in range(len(columns.x)):
             spots = column_spots(scene, columns, c)
