@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import FLOATS, INTEGERS, Workbench, deal
 from forest.growth.pipes import SUPPORT
@@ -199,7 +199,7 @@ def _shape_rings(arena, trees, row, species, work, tips, rings):  # type: ignore
         rings[s + i, 1] = azimuth
 
 
-@njit
+@driver
 def shape_rings(first, step, arena, trees, shared, scratch, species, rings):  # type: ignore[no-untyped-def]
     """Fill `rings` for all metamers of all trees (see `reaction_rings`)."""
     for b in range(first, len(shared.place) - 1, step):

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import BINS, Deal
 from forest.mechanics.elimination import balance
@@ -298,7 +298,7 @@ def _write(tree, rods, tip, bud, work, part):  # type: ignore[no-untyped-def]
         write4(rods.frame, i, frame)
 
 
-@njit
+@driver
 def _settle_chunks(first, step, arena, trees, shared, rods, loads, work, tolerance, most, out):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):

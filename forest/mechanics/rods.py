@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import BINS, Deal
 from forest.mechanics.quaternions import (
@@ -144,7 +144,7 @@ def _frame_tree(parent, birth, tip, length, rods, step, tropism, stiffness):  # 
         rods.ringed[i] = 0.0
 
 
-@njit
+@driver
 def _frame_chunks(first, step, arena, trees, shared, rods, year, tropism, stiffness):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):

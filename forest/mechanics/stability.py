@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import FLOATS, INTEGERS, Workbench, deal
 from forest.mechanics.stems import GRAVITY, NO_RIGIDITY, StemSpecies, stem_stations
@@ -200,7 +200,7 @@ def _foot(stem, tip, station):  # type: ignore[no-untyped-def]
     return np.float64(tip[stem.metamer[station - 1], 2]) if station > 0 else 0.0
 
 
-@njit
+@driver
 def measure_stability(first, step, arena, trees, shared, scratch, species, rigidity, wind, out):  # type: ignore[no-untyped-def]
     """Fill `out` for every tree that has a metamer (see `stability`)."""
     for b in range(first, len(shared.place) - 1, step):

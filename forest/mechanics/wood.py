@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import BINS, Deal
 from forest.mechanics.righting import (
@@ -184,7 +184,7 @@ def _lay(rods, k, radius, sought, w, righting, ring):  # type: ignore[no-untyped
     rods.rest[k, 2] = np.float32(rods.rest[k, 2] + bent * turn_u)
 
 
-@njit
+@driver
 def _lay_chunks(first, step, arena, trees, shared, rods, woods, righting, ring):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for t in range(shared.first[b], shared.first[b + 1]):
