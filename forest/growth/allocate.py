@@ -11,7 +11,7 @@ from numba import prange
 
 from forest import random
 from forest._jit import njit, njit_parallel
-from forest.growth.balance import hand_up, hand_up_priced, survey, trunk_growth, wood_of
+from forest.growth.balance import hand_up, hand_up_priced, know_limbs, trunk_growth, wood_of
 from forest.growth.bud_fate import gather_light, share_borchert_honda, share_priority
 from forest.growth.budget import (
     INCOME,
@@ -141,7 +141,7 @@ def _hold_back(arena, s, e, t, sp, year, tree_id):  # type: ignore[no-untyped-de
 
 
 @njit
-def _tree(arena, s, e):  # type: ignore[no-untyped-def]
+def tree_part(arena, s, e):  # type: ignore[no-untyped-def]
     """One tree's part of the fields that bud fate and balance read."""
     return Tree(
         arena.parent[s:e],
@@ -180,9 +180,7 @@ def _survey(arena, s, tree, t, sp, year, tree_id, units, work, ints):  # type: i
                 arena.length[k],
             )
         limbs.bud[i] = 1.0 if may else 0.0
-    gains = (t.of[sp].min_growth, t.of[sp].offset_gain, t.of[sp].light_gain)
-    area = t.of[sp].leaf_area / year.full_light
-    survey(tree, units, wood_of(t, sp), gains, (t.of[sp].offset_length, area), limbs)
+    know_limbs(tree, t, sp, year, units, limbs)
     return limbs
 
 
@@ -193,7 +191,7 @@ def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints): 
     n = trees.size[row]
     e = s + n
     sp = trees.species[row]
-    tree = _tree(arena, s, e)
+    tree = tree_part(arena, s, e)
     tree_id = trees.tree_id[row]
     if balance is None:
         q_base = gather_light(tree.parent, tree.state, tree.light, work[0], work[1])
@@ -206,7 +204,7 @@ def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints): 
             _hold_back(arena, s, e, t, sp, year, tree_id)
     else:
         units = unit_costs(t, sp)
-        wood = wood_of(t, sp)
+        wood = wood_of(t, sp, year.paper)
         limbs = _survey(arena, s, tree, t, sp, year, tree_id, units, work, ints)
         e_0 = trunk_growth(tree, limbs, wood, t.of[sp].thickening)
         hand_up(tree, e_0, units, t.of[sp].max_metamers, wood, limbs, work[2], work[3])
@@ -262,7 +260,7 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
     n = trees.size[row]
     e = s + n
     sp = trees.species[row]
-    tree = _tree(arena, s, e)
+    tree = tree_part(arena, s, e)
     path, pipe_path = work[4], work[5]
     path_lengths(tree.parent, tree.order, tree.length, t.of[sp].branch_pipe, path, pipe_path)
     rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
@@ -292,7 +290,7 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
         tree_id = trees.tree_id[row]
         limbs = _survey(arena, s, tree, t, sp, year, tree_id, price, work, ints)
         prices = (pipe_path, pipe_cost, t.of[sp].branch_pipe)
-        hand_up_priced(tree, budget, price, prices, wood_of(t, sp), limbs, work[2], work[3])
+        hand_up_priced(tree, budget, price, prices, wood_of(t, sp, year.paper), limbs, work[2], work[3])
     for i in range(n):
         if not arena.state[s + i] & TERMINAL:
             work[2, i] = 0.0

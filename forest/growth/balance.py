@@ -16,6 +16,7 @@ from forest._jit import njit
 from forest.growth.limbs import (
     Wood,
     base_radius,
+    can_grow,
     cone_volume,
     find_limbs,
     needs_to_support,
@@ -24,14 +25,18 @@ from forest.growth.limbs import (
     supports,
     weigh_limbs,
 )
-from forest.trees.metamers import MAIN, NO_ROOM_TERMINAL, TERMINAL
+from forest.trees.metamers import MAIN
 
 
 @njit
-def wood_of(t, sp):  # type: ignore[no-untyped-def]
+def wood_of(t, sp, paper):  # type: ignore[no-untyped-def]
     """The wood of a species, as `forest.growth.limbs` reads it."""
     return Wood(
-        t.of[sp].density, t.of[sp].support, t.of[sp].pipe_exponent, 0.5 * t.of[sp].twig_diameter
+        t.of[sp].density,
+        t.of[sp].support,
+        t.of[sp].pipe_exponent,
+        0.5 * t.of[sp].twig_diameter,
+        paper,
     )
 
 
@@ -76,12 +81,9 @@ def growth_rates(tree, centre, gains, ell, area, limbs):  # type: ignore[no-unty
                 y -= np.float64(tree.tip[p, 1])
                 z -= np.float64(tree.tip[p, 2])
             reach = max(np.sqrt(x * x + y * y + z * z), 1e-9)
-            state = tree.state[last]
-            limbs.rate[i] = 0.0
-            if state & TERMINAL and not state & NO_ROOM_TERMINAL:
-                heading = (x / reach, y / reach)
-                limbs.rate[i] = growth_rate(gains, heading, centre, ell, limbs.light[i])
-            limbs.total[i] = limbs.rate[i]
+            heading = (x / reach, y / reach)
+            limbs.rate[i] = growth_rate(gains, heading, centre, ell, limbs.light[i])
+            limbs.total[i] = limbs.rate[i] if can_grow(tree, limbs, i) else 0.0
         if limbs.bud[i] > 0.0:
             heading = (np.float64(tree.bud[i, 0]), np.float64(tree.bud[i, 1]))
             own = area * np.float64(tree.light[i])
@@ -170,7 +172,7 @@ def hand_up(tree, e_0, units, most, wood, limbs, v_main, v_side):  # type: ignor
                 grown = cone_volume(length, new, twig) - cone_volume(length, radius, twig)
                 e = max(e - wood.density * grown, 0.0)
             limbs.extra[i] = e
-            if limbs.rate[i] > 0.0:
+            if limbs.rate[i] > 0.0 and can_grow(tree, limbs, i):
                 last = np.int64(limbs.last[i])
                 own = limbs.rate[i] / limbs.total[i] * e
                 metamer = wood.density * cone_volume(units[min(order, top), 1], new, twig)
@@ -220,7 +222,7 @@ def hand_up_priced(tree, e_0, price, prices, wood, limbs, v_main, v_side):  # ty
             spare = supports(base_radius(tree.pipe[i], wood), wood) - limbs.supported[i]
             e = min(e, max(spare, 0.0))
             limbs.extra[i] = e
-            if limbs.rate[i] > 0.0:
+            if limbs.rate[i] > 0.0 and can_grow(tree, limbs, i):
                 last = np.int64(limbs.last[i])
                 o = min(order, top)
                 step = price[o, 1] * (branch_pipe if order > 0 else 1.0)
@@ -250,6 +252,14 @@ def survey(tree, units, wood, gains, shape, limbs):  # type: ignore[no-untyped-d
     ell = max(shape[0] * base_radius(tree.pipe[0], wood), 1e-6)
     growth_rates(tree, centre, gains, ell, shape[1], limbs)
     pass_down(tree, limbs, limbs.light)
+
+
+@njit
+def know_limbs(tree, t, sp, year, units, limbs):  # type: ignore[no-untyped-def]
+    """Survey a tree by the parameters of its species."""
+    gains = (t.of[sp].min_growth, t.of[sp].offset_gain, t.of[sp].light_gain)
+    shape = (t.of[sp].offset_length, t.of[sp].leaf_area / year.full_light)
+    survey(tree, units, wood_of(t, sp, year.paper), gains, shape, limbs)
 
 
 @njit

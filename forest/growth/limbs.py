@@ -1,8 +1,9 @@
 """Limbs and what they carry: Hart & Baker 2003, sections 3.4 and 4.1, eqs 6-14.
 
-Their limb is an axis: a truncated cone from the base of the axis to its tip, which is as thick as
-a twig. The trunk is limb 0. A living lateral bud is a limb of length 0. What a bud has been
-promised, the fraction of an internode that it holds, counts as grown: it is carried.
+Their limb is an axis: in paper mode a truncated cone from the base of the axis to its tip, which is
+as thick as a twig; in mass-balance mode, where rings shape it, the sum of its internodes. The trunk
+is limb 0. A living lateral bud is a limb of length 0. What a bud has been promised, the fraction of
+an internode that it holds, counts as grown: it is carried.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from forest._jit import njit
 from forest.growth.bud_fate import lit_buds
-from forest.trees.metamers import LATERAL, MAIN, TERMINAL
+from forest.trees.metamers import LATERAL, MAIN, NO_ROOM_TERMINAL, TERMINAL
 
 
 class Wood(NamedTuple):
@@ -30,12 +31,15 @@ class Wood(NamedTuple):
         n of pipe = diameter^n.
     twig : float
         Radius r of a limb's tip, m.
+    cones : bool
+        Whether a limb is weighed as a cone; else as the sum of its internodes.
     """
 
     density: float
     support: float
     exponent: float
     twig: float
+    cones: bool
 
 
 class Limbs(NamedTuple):
@@ -54,9 +58,9 @@ class Limbs(NamedTuple):
     light : float64 (n,)
         Lit leaf area P of the limb and of all that it supports, m2; first its own, p.
     rate : float64 (n,)
-        Growth rate g; 0 where no terminal bud can grow.
+        Growth rate g.
     total : float64 (n,)
-        Growth rate G of the limb and of all that it supports.
+        Growth rate G of the limb and of all that it supports, of what can grow.
     extra : float64 (n,)
         Mass of new growth e, then e', kg.
     bud : float64 (n,)
@@ -162,23 +166,36 @@ def weigh_limbs(tree, units, wood, limbs):  # type: ignore[no-untyped-def]
             limbs.supported[h] += m
             moment_x += m * np.float64(tree.tip[i, 0])
             moment_y += m * np.float64(tree.tip[i, 1])
-        if tree.state[i] & TERMINAL:
-            limbs.length[h] += np.float64(tree.resource[i, 0]) * units[min(order, top), 1]
-        if h != i:
-            continue
-        base = base_radius(tree.pipe[i], wood)
-        m = wood.density * cone_volume(limbs.length[i], base, wood.twig)
-        part = cone_centre(base, wood.twig)
-        end = np.int64(limbs.last[i])
         p = np.int64(tree.parent[i])
         x0 = np.float64(tree.tip[p, 0]) if i > 0 else 0.0
         y0 = np.float64(tree.tip[p, 1]) if i > 0 else 0.0
+        end = i
+        part = 0.5
+        radius = base_radius(tree.pipe[i], wood)
+        m = wood.density * cone_volume(np.float64(tree.length[i]), radius, radius)
+        if tree.state[i] & TERMINAL:
+            promised = np.float64(tree.resource[i, 0]) * units[min(order, top), 1]
+            limbs.length[h] += promised
+            m += wood.density * cone_volume(promised, wood.twig, wood.twig)
+        if wood.cones:
+            if h != i:
+                continue
+            m = wood.density * cone_volume(limbs.length[i], radius, wood.twig)
+            part = cone_centre(radius, wood.twig)
+            end = np.int64(limbs.last[i])
         moment_x += m * (x0 + part * (np.float64(tree.tip[end, 0]) - x0))
         moment_y += m * (y0 + part * (np.float64(tree.tip[end, 1]) - y0))
-        limbs.supported[i] += m
-        if i > 0:
+        limbs.supported[h] += m
+        if h == i and i > 0:
             limbs.supported[limbs.head[p]] += limbs.supported[i]
     return moment_x / limbs.supported[0], moment_y / limbs.supported[0]
+
+
+@njit
+def can_grow(tree, limbs, head):  # type: ignore[no-untyped-def]
+    """Whether a limb has a terminal bud, and the bud room."""
+    state = tree.state[limbs.last[head]]
+    return state & TERMINAL and not state & NO_ROOM_TERMINAL
 
 
 @njit

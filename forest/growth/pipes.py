@@ -13,8 +13,8 @@ import numpy as np
 from numba import prange
 
 from forest._jit import njit, njit_parallel
-from forest.growth.allocate import income_rate
-from forest.growth.balance import lay_cones, wood_of
+from forest.growth.allocate import income_rate, tree_part, unit_costs
+from forest.growth.balance import know_limbs, lay_cones, wood_of
 from forest.growth.budget import (
     EXTENSION,
     RESERVE_CHANGE,
@@ -23,7 +23,8 @@ from forest.growth.budget import (
     path_lengths,
     site_income,
 )
-from forest.growth.dealing import BINS, FLOATS, Deal, Scratch
+from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
+from forest.growth.limbs import Limbs
 from forest.growth.parameters import SpeciesTraits, Year
 from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
@@ -106,7 +107,23 @@ def lay_ring(parent, order, pipe, sapwood, branch_pipe, keep, flow):  # type: ig
 
 
 @njit
-def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: ignore[no-untyped-def]
+def _favour_light_side(arena, s, e, t, sp, year, surplus, work, ints):  # type: ignore[no-untyped-def]
+    """Weight each site's surplus by the growth rate of its limb.
+
+    In the paper a limb's thickening is paid out of what growth rates hand up (eqs 18, 19).
+    """
+    limbs = Limbs(
+        ints[0], ints[1], work[6], work[7], work[8], work[9], work[10], work[11], work[4]
+    )
+    for i in range(e - s):
+        limbs.bud[i] = 0.0
+    know_limbs(tree_part(arena, s, e), t, sp, year, unit_costs(t, sp), limbs)
+    for i in range(e - s):
+        surplus[i] *= limbs.rate[limbs.head[i]]
+
+
+@njit
+def _thicken_balanced(arena, trees, row, t, year, accounts, work, ints):  # type: ignore[no-untyped-def]
     """Book the extension, then lay down this year's ring out of the rest of the spend."""
     s = trees.start[row]
     n = trees.size[row]
@@ -144,7 +161,10 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
             light = np.float64(arena.light[s + i])
             earned = site_income(light, path[i], rate, t.of[sp].hydraulic_length)
             surplus[i] *= max(earned - leaf, 0.0)
-            total += surplus[i]
+    if year.balance:
+        _favour_light_side(arena, s, e, t, sp, year, surplus, work, ints)
+    for i in range(n):
+        total += surplus[i]
     rest = max(accounts[row, SPEND] - extension, 0.0)
     wood = (t.of[sp].density, t.of[sp].support)
     support = reinforce(
@@ -201,7 +221,7 @@ def thicken(
                     arena.state[s : s + n],
                     arena.length[s : s + n],
                     arena.pipe[s : s + n],
-                    wood_of(traits, sp),
+                    wood_of(traits, sp, year.paper),
                     work[0],
                     work[1],
                 )
@@ -215,4 +235,6 @@ def thicken(
                     work[0],
                 )
             else:
-                _thicken_balanced(arena, trees, row, traits, year, accounts, work)
+                g = shared.place[b] * INTEGERS
+                ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
+                _thicken_balanced(arena, trees, row, traits, year, accounts, work, ints)

@@ -242,7 +242,7 @@ class Balance(Table):
         1.0, "weight of the limb's lit leaf area p_i", unit="1/m2", ge=0, le=1000
     )
     offset_length_factor: float = quantity(
-        10.0, "length that scales the offset, in radii of the trunk's base", gt=0, le=1000
+        1.0, "length that scales the offset, in radii of the trunk's base", gt=0, le=1000
     )
 
 

@@ -39,7 +39,7 @@ class Case:
             m.pipe[here] *= rng.choice([1e-3, 1.0], self.n)
         self.traits = traits
         self.tree = Tree(*(getattr(m, name)[here] for name in Tree._fields))
-        self.wood = Wood(traits.density, traits.support, traits.exponent, traits.twig)
+        self.wood = Wood(traits.density, traits.support, traits.exponent, traits.twig, traits.cones)
         self.limbs = Limbs(*np.empty((2, self.n), np.int32), *np.empty((7, self.n)))
         self.units = np.zeros((8, 2))
         self.units[:, 1] = [traits.unit_of(order) for order in range(8)]
@@ -92,21 +92,23 @@ def test_cone(base: float, part: float) -> None:
 
 def test_height_limit() -> None:
     """A cone of 300 feet carries itself exactly (eq. 8)."""
-    wood = Wood(500.0, np.pi * 30.48, 2.0, 0.0)
+    wood = Wood(500.0, np.pi * 30.48, 2.0, 0.0, True)
     assert supports(0.5, wood) == pytest.approx(500.0 * cone_volume(91.44, 0.5, 0.0))
 
 
-@given(seeds, st.sampled_from([1.0, 20.0, 500.0]), st.sampled_from([2.0, 2.5, 3.0]))
+@given(
+    seeds, st.sampled_from([1.0, 20.0, 500.0]), st.sampled_from([2.0, 2.5, 3.0]), st.booleans()
+)
 @settings(max_examples=25)
-def test_survey(seed: int, offset_length: float, exponent: float) -> None:
+def test_survey(seed: int, offset_length: float, exponent: float, cones: bool) -> None:
     """Masses, light and growth rates of every limb and bud."""
-    case = Case(seed, slow.Traits(offset_length=offset_length, exponent=exponent))
+    case = Case(seed, slow.Traits(offset_length=offset_length, exponent=exponent, cones=cones))
     case.survey()
     limbs, trunk = case.limbs, case.trunk
     buds = np.zeros(case.n)
     for limb in trunk.above():
         if not limb.nodes:
-            buds[limb.at] = limb.rate(trunk)
+            buds[limb.at] = limb.total(trunk)
             continue
         assert limbs.last[limb.at] == limb.nodes[-1].index
         assert (limbs.head[[n.index for n in limb.nodes]] == limb.at).all()
@@ -184,7 +186,7 @@ def test_limbs_support_what_they_carry(seed: int, e_0: float, height_limit: floa
 @settings(max_examples=25)
 def test_hand_up_priced(seed: int, budget: float, thin: bool) -> None:
     """Metamers that have a price: never more than the budget and than limbs can support."""
-    traits = slow.Traits(support=3.0)
+    traits = slow.Traits(support=3.0, cones=False)
     case = Case(seed, traits, thin=thin)
     rng = np.random.default_rng(seed)
     case.units[:, 0] = rng.uniform(1e-3, 1e-2, 8)
@@ -251,7 +253,7 @@ def test_growth_goes_to_the_light_side() -> None:
     tree = Tree(*(getattr(m, name)[here] for name in Tree._fields))
     limbs = Limbs(*np.empty((2, 4), np.int32), *np.zeros((7, 4)))
     units = np.full((8, 2), 0.2)
-    wood = Wood(500.0, np.pi * 30.48, 2.0, 0.001)
+    wood = Wood(500.0, np.pi * 30.48, 2.0, 0.001, True)
     survey(tree, units, wood, (0.1, 0.45, 0.0), (1.0, 0.01), limbs)
     heavy, light = limbs.rate[0], limbs.rate[3]
     assert heavy == pytest.approx(0.1)

@@ -23,6 +23,7 @@ class Traits:
     support: float = math.pi * 30.48
     exponent: float = 2.0
     twig: float = 0.001
+    cones: bool = True
     min_growth: float = 0.1
     offset_gain: float = 0.45
     light_gain: float = 1.0
@@ -85,6 +86,11 @@ class Limb:
     @property
     def m(self) -> float:
         """Mass of the limb."""
+        t = self.traits
+        if not t.cones:
+            promised = self.length - sum(n.length for n in self.nodes)
+            wood = [math.pi / 4.0 * n.pipe ** (2.0 / t.exponent) * n.length for n in self.nodes]
+            return t.density * (sum(wood) + t.volume(promised, t.twig))
         return self.traits.density * self.traits.volume(self.length, self.base)
 
     @property
@@ -97,6 +103,16 @@ class Limb:
         """x of the limb (eq. 11), on the straight line from its base to its tip."""
         if not self.nodes:
             return self.start
+        if not self.traits.cones:
+            t = self.traits
+            promised = self.length - sum(n.length for n in self.nodes)
+            moment = np.zeros(3)
+            for n in self.nodes:
+                m = t.density * math.pi / 4.0 * n.pipe ** (2.0 / t.exponent) * n.length
+                if n is self.nodes[-1]:
+                    m += t.density * t.volume(promised, t.twig)
+                moment += m * (n.start + n.tip) / 2.0
+            return np.asarray(moment / self.m)
         part = self.traits.centre(1.0, self.base)
         return np.asarray(self.start + part * (self.nodes[-1].tip - self.start))
 
@@ -115,8 +131,6 @@ class Limb:
 
     def rate(self, trunk: Limb) -> float:
         """g: eq. 13, clamped, and the sum that follows it."""
-        if not self.grows:
-            return 0.0
         t = self.traits
         away = trunk.centre[:2]
         ell = max(t.offset_length * trunk.base, 1e-6)
@@ -124,8 +138,9 @@ class Limb:
         return t.min_growth + t.offset_gain + t.offset_gain * offset + t.light_gain * self.p
 
     def total(self, trunk: Limb) -> float:
-        """G (eq. 15)."""
-        return self.rate(trunk) + sum(child.total(trunk) for child in self.children)
+        """G (eq. 15), of what can grow."""
+        own = self.rate(trunk) if self.grows else 0.0
+        return own + sum(child.total(trunk) for child in self.children)
 
 
 def limb_of(
