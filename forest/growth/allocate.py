@@ -159,9 +159,7 @@ def tree_part(arena, s, e):  # type: ignore[no-untyped-def]
 @njit
 def _survey(arena, s, tree, t, sp, year, tree_id, units, work, ints):  # type: ignore[no-untyped-def]
     """Find the buds that may start a limb, and know the limbs with their growth rates."""
-    limbs = Limbs(
-        ints[0], ints[1], work[6], work[7], work[8], work[9], work[10], work[11], work[0]
-    )
+    limbs = Limbs(ints[0], ints[1], work[6], work[7], work[8], work[9], work[10], work[11], work[0])
     drawn = _has_shoot_curves(t, sp)
     for i in range(len(tree.parent)):
         state = tree.state[i]
@@ -290,7 +288,9 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
         tree_id = trees.tree_id[row]
         limbs = _survey(arena, s, tree, t, sp, year, tree_id, price, work, ints)
         prices = (pipe_path, pipe_cost, t.of[sp].branch_pipe)
-        hand_up_priced(tree, budget, price, prices, wood_of(t, sp, year.paper), limbs, work[2], work[3])
+        hand_up_priced(
+            tree, budget, price, prices, wood_of(t, sp, year.paper), limbs, work[2], work[3]
+        )
     for i in range(n):
         if not arena.state[s + i] & TERMINAL:
             work[2, i] = 0.0

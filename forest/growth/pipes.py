@@ -112,9 +112,7 @@ def _favour_light_side(arena, s, e, t, sp, year, surplus, work, ints):  # type: 
 
     In the paper a limb's thickening is paid out of what growth rates hand up (eqs 18, 19).
     """
-    limbs = Limbs(
-        ints[0], ints[1], work[6], work[7], work[8], work[9], work[10], work[11], work[4]
-    )
+    limbs = Limbs(ints[0], ints[1], work[6], work[7], work[8], work[9], work[10], work[11], work[4])
     for i in range(e - s):
         limbs.bud[i] = 0.0
     know_limbs(tree_part(arena, s, e), t, sp, year, unit_costs(t, sp), limbs)

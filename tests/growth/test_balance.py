@@ -54,7 +54,9 @@ class Case:
     def read(self) -> slow.Limb:
         """The twin's limbs of the tree as it was."""
         bud = self.tree.bud.astype(float)
-        return slow.limb_of(self.nodes[0], self.traits, lambda i: bud[i], lambda n: self.may[n.index])
+        return slow.limb_of(
+            self.nodes[0], self.traits, lambda i: bud[i], lambda n: self.may[n.index]
+        )
 
     def survey(self) -> None:
         t = self.traits
@@ -96,9 +98,7 @@ def test_height_limit() -> None:
     assert supports(0.5, wood) == pytest.approx(500.0 * cone_volume(91.44, 0.5, 0.0))
 
 
-@given(
-    seeds, st.sampled_from([1.0, 20.0, 500.0]), st.sampled_from([2.0, 2.5, 3.0]), st.booleans()
-)
+@given(seeds, st.sampled_from([1.0, 20.0, 500.0]), st.sampled_from([2.0, 2.5, 3.0]), st.booleans())
 @settings(max_examples=25)
 def test_survey(seed: int, offset_length: float, exponent: float, cones: bool) -> None:
     """Masses, light and growth rates of every limb and bud."""
@@ -142,7 +142,9 @@ def test_hand_up(seed: int, e_0: float, thin: bool) -> None:
 def test_trunk_growth(seed: int, gain: float, thin: bool) -> None:
     case = Case(seed, slow.Traits(), thin=thin)
     case.survey()
-    _close(trunk_growth(case.tree, case.limbs, case.wood, gain), slow.trunk_growth(case.trunk, gain))
+    _close(
+        trunk_growth(case.tree, case.limbs, case.wood, gain), slow.trunk_growth(case.trunk, gain)
+    )
 
 
 @given(seeds, st.sampled_from([1e-3, 0.05, 0.5, 5.0]), st.booleans())

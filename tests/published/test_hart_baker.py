@@ -92,6 +92,8 @@ def test_a_pruned_tree_regains_its_balance() -> None:
     seeds = (1, 2, 3, 4)
     pruned, later = np.mean([_after_pruning(seed) for seed in seeds], axis=0)
     assert later < 0.5 * pruned
-    same_rate = [f"species.generic_deciduous.balance.{k}" for k in ("offset_gain=0", "min_growth=0.5")]
+    same_rate = [
+        f"species.generic_deciduous.balance.{k}" for k in ("offset_gain=0", "min_growth=0.5")
+    ]
     pruned, later = np.mean([_after_pruning(seed, *same_rate) for seed in seeds], axis=0)
     assert later > pruned
