@@ -12,11 +12,7 @@ import shutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TypeVar
-
-# Threads that wait must not spin: where other programs use the cores, spinning made two threads
-# seven times slower than one. This must be set before numba loads its threads.
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+from typing import Any, TypeVar
 
 import numba
 from numba.core import config
@@ -87,16 +83,26 @@ def announce_compiling(tell: Callable[[], None]) -> AbstractContextManager[None]
     return context
 
 
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "error_model": "numpy",
+    "nogil": True,
+    "no_cfunc_wrapper": True,
+}
+
+
 def njit(function: F) -> F:
-    """Compile a serial kernel: cached, no fastmath, division as in C."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    """Compile a kernel: cached, no fastmath, division as in C, run without Python's lock.
+
+    No kernel uses numba's own threads (see `forest._threads`), nor is called from C.
+    """
+    return numba.njit(**_OPTIONS, _nrt=True)(function)  # type: ignore[no-any-return]
 
 
-def njit_parallel(function: F) -> F:
-    """Compile a driver that runs fixed chunks in threads (three times the compile time)."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True, parallel=True)(function)  # type: ignore[no-any-return]
+def driver(function: F) -> F:
+    """Compile a kernel that `forest._threads.in_threads` runs over its chunks.
 
-
-def inline(function: F) -> F:
-    """Compile a small function into its callers."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True, inline="never")(function)  # type: ignore[no-any-return]
+    Its arrays belong to the caller, so references to them need not be counted: counting took up
+    to half of a kernel's time. A driver must not make arrays itself; what it calls may.
+    """
+    return numba.njit(**_OPTIONS, _nrt=False)(function)  # type: ignore[no-any-return]

@@ -7,8 +7,12 @@ t on. Nothing that is computed depends on T.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class _Threads:
@@ -48,19 +52,35 @@ _threads = _Threads()
 os.register_at_fork(after_in_child=_threads.forget)
 
 
-def threads() -> int:
+def thread_count() -> int:
     """How many threads kernels run in."""
     return _threads.count
 
 
 def most_threads() -> int:
-    """How many threads kernels can run in at most."""
+    """How many threads kernels run in unless told otherwise."""
     return _cores()
 
 
-def set_threads(count: int) -> None:
+@contextmanager
+def using_threads(count: int) -> Iterator[None]:
     """Let kernels run in `count` threads. No result depends on it."""
+    before = _threads.count
     _threads.count = count
+    try:
+        yield
+    finally:
+        _threads.count = before
+
+
+def share_out(function: Callable[[T], object], items: Sequence[T]) -> None:
+    """Call `function` with each item, the items dealt to the threads."""
+
+    def take_every(first: int, step: int) -> None:
+        for item in items[first::step]:
+            function(item)
+
+    _threads.run(take_every, ())
 
 
 def in_threads(kernel: Callable[..., object], *args: object) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from forest._jit import announce_compiling
+from forest._threads import most_threads, using_threads
 from forest.errors import InputError
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
@@ -216,19 +217,14 @@ def _check_nothing_is_lost(out: Path) -> None:
 @contextmanager
 def _threads(wanted: int | None) -> Iterator[int]:
     """Compute with so many threads, all by default; give their number."""
-    import numba
-
-    before, available = numba.get_num_threads(), numba.config.NUMBA_NUM_THREADS
+    available = most_threads()
     count = available if wanted is None else wanted
     if not 1 <= count <= available:
         raise InputError(
             f"{count} threads", where="threads", expected=f"1 to {available} on this machine"
         )
-    numba.set_num_threads(count)
-    try:
+    with using_threads(count):
         yield count
-    finally:
-        numba.set_num_threads(before)
 
 
 @contextmanager

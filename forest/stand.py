@@ -19,7 +19,7 @@ from forest.growth.dealing import Deal, Workbench, deal
 from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import thicken
 from forest.growth.shedding import shed
-from forest.growth.shoots import extend, headings, shooting_buds, sprout
+from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import remember_breast
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.record.schema import CAUSES
@@ -136,9 +136,7 @@ class Stand:
         shoots = shooting_buds(self.arena.metamers, rows, shared, self._traits)
         self.arena.make_room(rows.start, rows.size, rows.room, rows.size + shoots.new)
         arena = self.arena.metamers
-        heading = np.empty((len(shoots.metamer), 3), np.float32)
-        headings(arena, rows, shared, shoots, heading)
-        toward = self._surroundings.directions(arena, rows, shoots, heading)
+        toward = self._surroundings.directions(arena, rows, shoots)
         extend(
             arena,
             rows,

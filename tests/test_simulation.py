@@ -6,10 +6,10 @@ import os
 import signal
 from pathlib import Path
 
-import numba
 import pytest
 
 import forest
+from forest._threads import thread_count
 from forest.errors import InputError
 from forest.progress import Silent
 from forest.record.checkpoint import checkpoint_paths, remove_checkpoints
@@ -157,10 +157,10 @@ def test_overwriting_forgets_old_checkpoints(tmp_path: Path) -> None:
 
 
 def test_threads(tmp_path: Path) -> None:
-    before = numba.get_num_threads()
+    before = thread_count()
     with simulate(tiny("years=1"), tmp_path / "run.h5", threads=1) as run:
         assert run.provenance["sessions"][0]["environment"]["threads"] == 1
-    assert numba.get_num_threads() == before
+    assert thread_count() == before
     with pytest.raises(InputError, match="999 threads"):
         simulate(tiny("years=1"), tmp_path / "b.h5", threads=999)
     assert not (tmp_path / "b.h5").exists()

@@ -113,9 +113,9 @@ def _settle_process() -> None:
     Two processes that add different signatures to one cache can leave an index that names the
     other's code, so none may write to what another one reads.
     """
-    if "numba" in sys.modules:
+    if "forest._threads" in sys.modules:
         return
-    os.environ["NUMBA_NUM_THREADS"] = "1"
+    os.environ["FOREST_THREADS"] = "1"
     from distributed import get_worker
 
     base = os.environ.get("FOREST_CACHE") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import inline
+from forest._jit import njit
 from forest.environment.sweep import make_rays, sweep
 
 
@@ -53,7 +53,7 @@ class Frame(NamedTuple):
     lift: Any
 
 
-@inline
+@njit
 def frame_of(field: Any) -> Any:
     """Take a field's place out of its arrays, for use in loops."""
     inverse = 1.0 / max(field.ratio, 1)
@@ -61,7 +61,7 @@ def frame_of(field: Any) -> Any:
     return Frame(field.origin[0], field.origin[1], top, field.ratio, inverse, field.lift)
 
 
-@inline
+@njit
 def coarse(index: Any, inverse: Any) -> Any:
     """Divide a voxel's number by a ratio, rounding down, without the slow integer division.
 
@@ -70,7 +70,7 @@ def coarse(index: Any, inverse: Any) -> Any:
     return np.int64(np.floor((index + 0.5) * inverse))
 
 
-@inline
+@njit
 def layers_above(frame: Any, iz: Any) -> Any:
     """Find the two layers between whose centres a site reads T, and the share of the upper.
 

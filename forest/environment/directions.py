@@ -5,12 +5,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import inline, njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.environment.light_grid import ShadowField, place_in, window_of
 from forest.environment.obstacles import Solid, solid_at
+from forest.environment.voxels import site_voxel
+from forest.trees.buds import Shoots, bud_heading
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
 
 CHUNKS = 64
 
@@ -71,7 +75,7 @@ class _Bud(NamedTuple):
     own: Any
 
 
-@inline
+@njit
 def _own_layer(way: Any, n: Any) -> Any:
     """Tell in which layer of a bud's own pyramid of `n` layers a voxel lies; -1 if in none."""
     dx, dy, dz = way
@@ -155,54 +159,102 @@ def _to_least_shadow(
         out[axis] = unit[best, axis] if differs else np.float32(0.0)
 
 
-@njit_parallel
-def _directions(
+@njit
+def _direct(
+    first: Any,
+    last: Any,
+    metamers: Any,
+    trees: Any,
+    shoots: Any,
     field: Any,
     solid: Any,
     around: Any,
     shade_units: Any,
-    species: Any,
-    voxel: Any,
-    heading: Any,
+    voxel_m: Any,
     gradient: Any,
-) -> Any:
-    n = len(species)
-    out = np.empty((n, 3), np.float32)
-    for chunk in prange(CHUNKS):
-        for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            bud = _Bud(
-                np.int64(voxel[k, 0]),
-                np.int64(voxel[k, 1]),
-                np.int64(voxel[k, 2]),
-                np.int64(shade_units[species[k]]),
-            )
-            if gradient:
-                _against_gradient(field, bud, out[k])
-            else:
-                _to_least_shadow(field, solid, around, bud, species[k], heading[k], out[k])
-    return out
+    out: Any,
+) -> None:
+    """Set the directions of the shoots `first` to `last`."""
+    heading = np.empty(3, np.float32)
+    row = np.searchsorted(shoots.first, first, side="right") - 1
+    for k in range(first, last):
+        while k >= shoots.first[row + 1]:
+            row += 1
+        i = np.int64(shoots.metamer[k])
+        species = trees.species[row]
+        tip = metamers.tip[trees.start[row] + i]
+        bud = _Bud(
+            site_voxel(trees.base_voxel[row, 0], trees.base_offset[row, 0], tip[0], voxel_m),
+            site_voxel(trees.base_voxel[row, 1], trees.base_offset[row, 1], tip[1], voxel_m),
+            site_voxel(trees.base_voxel[row, 2], trees.base_offset[row, 2], tip[2], voxel_m),
+            np.int64(shade_units[species]),
+        )
+        if gradient:
+            _against_gradient(field, bud, out[k])
+        else:
+            kind = np.int64(shoots.bud[k])
+            heading[0], heading[1], heading[2] = bud_heading(metamers, trees.start[row], i, kind)
+            _to_least_shadow(field, solid, around, bud, species, heading, out[k])
+
+
+@driver
+def _direct_chunks(
+    first: Any,
+    step: Any,
+    metamers: Any,
+    trees: Any,
+    shoots: Any,
+    field: Any,
+    solid: Any,
+    around: Any,
+    shade_units: Any,
+    voxel_m: Any,
+    gradient: Any,
+    out: Any,
+) -> None:
+    n = len(shoots.metamer)
+    for chunk in range(first, CHUNKS, step):
+        _direct(
+            chunk * n // CHUNKS,
+            (chunk + 1) * n // CHUNKS,
+            metamers,
+            trees,
+            shoots,
+            field,
+            solid,
+            around,
+            shade_units,
+            voxel_m,
+            gradient,
+            out,
+        )
 
 
 def preferred_directions(
+    metamers: Metamers,
+    trees: Trees,
+    shoots: Shoots,
     field: ShadowField,
     solid: Solid,
     around: Perception,
     shade_units: NDArray[np.uint16],
-    species: NDArray[np.int16],
-    voxel: NDArray[np.int32],
-    heading: NDArray[np.float32],
+    voxel_m: np.float32,
     *,
     mode: str,
 ) -> NDArray[np.float32]:
-    """Give the direction of most light for each bud.
+    """Give the direction of most light for each shooting bud.
 
     The bud's own pyramid is left out, as the bud's own shadow is in its light. What lies below
     the ground or in an obstacle is never chosen.
 
     Parameters
     ----------
-    species, voxel, heading : int16 (n,), int32 (n, 3), float32 (n, 3)
-        Species, near-field voxel and unit direction of each bud.
+    shoots : Shoots
+        n buds.
+    field : ShadowField
+        The near field; its voxels have the edge `voxel_m`.
+    shade_units : uint16 (species,)
+        Shade that a bud of each species casts.
     mode : {"gradient", "least_shadow"}
         Against the gradient of the shadow (central differences), or to the centre of the least
         shadowed voxel in the perception volume (ties: the nearest, then in the order z, y, x).
@@ -216,6 +268,18 @@ def preferred_directions(
     ----------
     Palubicki et al. 2009, section 4.1.
     """
-    return np.asarray(
-        _directions(field, solid, around, shade_units, species, voxel, heading, mode == "gradient")
+    out = np.empty((len(shoots.metamer), 3), np.float32)
+    in_threads(
+        _direct_chunks,
+        metamers,
+        trees,
+        shoots,
+        field,
+        solid,
+        around,
+        shade_units,
+        voxel_m,
+        mode == "gradient",
+        out,
     )
+    return out

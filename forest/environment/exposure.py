@@ -25,6 +25,7 @@ from forest.environment.site_light import (
 from forest.environment.sky import sky_directions, sun_directions
 from forest.environment.voxels import bound_blocks, deal_blocks
 from forest.errors import InputError
+from forest.trees.buds import Shoots
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
 
@@ -243,36 +244,25 @@ class Light:
         slab = -(-max(rows, 1) // (SLABS * ratio)) * ratio
         return Plot(self._voxel_m, nx, ny, int(self._periodic), first, slab)
 
-    def directions(
-        self,
-        species: NDArray[np.int16],
-        voxel: NDArray[np.int32],
-        heading: NDArray[np.float32],
-    ) -> NDArray[np.float32]:
-        """Give each bud's direction of most light V in the field of the last `expose`.
-
-        Parameters
-        ----------
-        species : int16 (n,)
-        voxel : int32 (n, 3)
-            Near-field voxel (ix, iy, iz) of each bud; need not be wrapped.
-        heading : float32 (n, 3)
-            Unit direction of each bud.
+    def directions(self, metamers: Metamers, trees: Trees, shoots: Shoots) -> NDArray[np.float32]:
+        """Give each shooting bud's direction of most light V in the field of the last `expose`.
 
         Returns
         -------
         float32 (n, 3)
             Unit vectors; zero where no direction is better, or without a near field.
         """
-        field = self._grid.field if self._grid else no_shadow()
+        if self._grid is None:
+            return np.zeros((len(shoots.metamer), 3), np.float32)
         return preferred_directions(
-            field,
+            metamers,
+            trees,
+            shoots,
+            self._grid.field,
             self.solid,
             self._around,
             self._units.shade,
-            species,
-            voxel,
-            heading,
+            self._voxel_m,
             mode=self._mode,
         )
 

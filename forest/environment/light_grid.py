@@ -12,10 +12,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import inline, njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.environment.voxels import wrap
 
 #: Count that stands for a bud of shade factor 1.
@@ -150,13 +150,17 @@ def _shade_strip(field: Any, first_row: Any, last_row: Any) -> None:
                     _add_squares(out, integral[slot], row, q, q_max, field.weights[q])
 
 
-@njit_parallel
-def propagate(field: Any) -> None:
-    """Rebuild `shadow` from `counts` in the layers that can hold shadow."""
+@driver
+def _propagate_strips(first: Any, step: Any, field: Any) -> None:
     ny = field.counts.shape[1]
     strips = (ny + STRIP - 1) // STRIP
-    for strip in prange(strips):
+    for strip in range(first, strips, step):
         _shade_strip(field, strip * STRIP, min((strip + 1) * STRIP, ny))
+
+
+def propagate(field: ShadowField) -> None:
+    """Rebuild `shadow` from `counts` in the layers that can hold shadow."""
+    in_threads(_propagate_strips, field)
 
 
 class Window(NamedTuple):
@@ -172,7 +176,7 @@ class Window(NamedTuple):
     periodic: Any
 
 
-@inline
+@njit
 def window_of(field: Any) -> Any:
     """Take a field's place out of its arrays, for use in loops."""
     return Window(
@@ -187,7 +191,7 @@ def window_of(field: Any) -> Any:
     )
 
 
-@inline
+@njit
 def place_in(window: Any, ix: Any, iy: Any, iz: Any) -> Any:
     """Find a voxel of the plot in the grid, as (z, y, x); z is -1 where there is no shadow.
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
 
@@ -79,10 +79,6 @@ def _tree_of(first_site: Any, site: Any) -> Any:
     return np.searchsorted(first_site, site, side="right") - 1
 
 
-# Fields of tuples are written in serial functions only: inside a prange numba takes
-# `buds.kind[b] = kind` for dead code and drops it.
-
-
 @njit
 def _count_in(state: Any, start: Any, end: Any) -> Any:
     """Count the living buds of the arena's metamers `start` to `end`."""
@@ -92,10 +88,11 @@ def _count_in(state: Any, start: Any, end: Any) -> Any:
     return buds
 
 
-@njit_parallel
-def _count_buds(metamers: Any, trees: Any, first_site: Any) -> Any:
-    count = np.zeros(CHUNKS, np.int64)
-    for c in prange(CHUNKS):
+@driver
+def _count_buds(
+    first: Any, step: Any, metamers: Any, trees: Any, first_site: Any, count: Any
+) -> None:
+    for c in range(first, CHUNKS, step):
         site, end = chunk_bounds(first_site[-1], c)
         while site < end:
             t = _tree_of(first_site, site)
@@ -103,7 +100,6 @@ def _count_buds(metamers: Any, trees: Any, first_site: Any) -> Any:
             stop = min(end, first_site[t + 1])
             count[c] += _count_in(metamers.state, site + shift, stop + shift)
             site = stop
-    return count
 
 
 @njit
@@ -148,9 +144,11 @@ def _fill_tree(metamers: Any, trees: Any, t: Any, first: Any, end: Any, b: Any, 
     return b
 
 
-@njit_parallel
-def _fill_buds(metamers: Any, trees: Any, first_site: Any, first_bud: Any, buds: Any) -> None:
-    for c in prange(CHUNKS):
+@driver
+def _fill_buds(
+    first: Any, step: Any, metamers: Any, trees: Any, first_site: Any, first_bud: Any, buds: Any
+) -> None:
+    for c in range(first, CHUNKS, step):
         site, end = chunk_bounds(first_site[-1], c)
         b = first_bud[c]
         while site < end:
@@ -169,7 +167,8 @@ def _first_sites(trees: Trees) -> NDArray[np.int64]:
 def list_buds(metamers: Metamers, trees: Trees) -> Buds:
     """List the living buds of all trees."""
     first_site = _first_sites(trees)
-    count = _count_buds(metamers, trees, first_site)
+    count = np.zeros(CHUNKS, np.int64)
+    in_threads(_count_buds, metamers, trees, first_site, count)
     first_bud = np.concatenate((np.zeros(1, np.int64), np.cumsum(count)))
     n = int(first_bud[-1])
     buds = Buds(
@@ -182,7 +181,7 @@ def list_buds(metamers: Metamers, trees: Trees) -> Buds:
         position=np.empty((n, 3)),
         heading=np.empty((n, 3), np.float32),
     )
-    _fill_buds(metamers, trees, first_site, first_bud, buds)
+    in_threads(_fill_buds, metamers, trees, first_site, first_bud, buds)
     rows = np.arange(len(trees.size) + 1, dtype=np.int32)
     return buds._replace(first_of_tree=np.searchsorted(buds.tree_row, rows).astype(np.int64))
 
@@ -222,9 +221,11 @@ def _mark_tree(states: Any, found: Any, b: Any) -> None:
         states[k] = state
 
 
-@njit_parallel
-def _mark_room(metamers: Any, trees: Any, first_site: Any, space: Any) -> None:
-    for c in prange(CHUNKS):
+@driver
+def _mark_room(
+    begin: Any, step: Any, metamers: Any, trees: Any, first_site: Any, space: Any
+) -> None:
+    for c in range(begin, CHUNKS, step):
         site, end = chunk_bounds(first_site[-1], c)
         while site < end:
             t = _tree_of(first_site, site)
@@ -247,4 +248,4 @@ def apply_space(metamers: Metamers, trees: Trees, space: BudSpace) -> None:
     space : BudSpace
         This year's claims.
     """
-    _mark_room(metamers, trees, _first_sites(trees), space)
+    in_threads(_mark_room, metamers, trees, _first_sites(trees), space)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import prange
+from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.environment.marker_buds import CHUNKS, chunk_bounds
-from forest.environment.marker_tiles import CELLS, EDGE, cell_words, jitter
+from forest.environment.marker_tiles import CELLS, EDGE, Cloud, Entries, Lattice, cell_words, jitter
 
 
 @njit
@@ -61,8 +62,10 @@ def _marker(lattice: Any, tile: Any, code: Any) -> Any:
     return x, (j + v) * lattice.cell[1], (k + w) * lattice.cell[2]
 
 
-@njit_parallel
-def directions(
+@driver
+def _direction_chunks(
+    begin: Any,
+    step: Any,
     lattice: Any,
     entries: Any,
     cloud: Any,
@@ -71,18 +74,11 @@ def directions(
     cloud_winner: Any,
     first: Any,
     won: Any,
-) -> Any:
-    """Sum the unit vectors from each bud to its markers, normalized (V of 4.1).
-
-    Returns
-    -------
-    float32 (n_buds, 3)
-        Zero for a bud without markers.
-    """
+    direction: Any,
+) -> None:
     n_buds = len(first) - 1
-    direction = np.zeros((n_buds, 3), np.float32)
     flat = winner.reshape(-1)
-    for c in prange(CHUNKS):
+    for c in range(begin, CHUNKS, step):
         start, end = chunk_bounds(n_buds, c)
         for b in range(start, end):
             sx = sy = sz = 0.0
@@ -108,4 +104,36 @@ def directions(
                 direction[b, 0] = sx / length
                 direction[b, 1] = sy / length
                 direction[b, 2] = sz / length
+
+
+def directions(
+    lattice: Lattice,
+    entries: Entries,
+    cloud: Cloud,
+    tiles: NDArray[np.int64],
+    winner: NDArray[np.int32],
+    cloud_winner: NDArray[np.int32],
+    first: NDArray[np.int64],
+    won: NDArray[np.int64],
+) -> NDArray[np.float32]:
+    """Sum the unit vectors from each bud to its markers, normalized (V of 4.1).
+
+    Returns
+    -------
+    float32 (n_buds, 3)
+        Zero for a bud without markers.
+    """
+    direction = np.zeros((len(first) - 1, 3), np.float32)
+    in_threads(
+        _direction_chunks,
+        lattice,
+        entries,
+        cloud,
+        tiles,
+        winner,
+        cloud_winner,
+        first,
+        won,
+        direction,
+    )
     return direction

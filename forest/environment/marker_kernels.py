@@ -5,14 +5,21 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
-from forest.environment.marker_buds import CHUNKS
+from forest._jit import driver, njit
+from forest._threads import in_threads
+from forest.environment.marker_buds import CHUNKS, Buds
 from forest.environment.marker_tiles import (
     CELLS,
     EDGE,
+    Cloud,
+    Entries,
+    Envelopes,
+    Gone,
+    Lattice,
+    Rows,
+    Sites,
     cell_words,
     inside,
     jitter,
@@ -280,8 +287,9 @@ def _work_on_tile(
             cloud_winner[free.code[m] - CELLS] = free.winner[m]
 
 
-@njit_parallel
-def compete(
+@njit
+def _compete_chunk(
+    chunk: Any,
     lattice: Any,
     entries: Any,
     rows_near: Any,
@@ -294,7 +302,89 @@ def compete(
     release: Any,
     tiles: Any,
     scratch_size: Any,
-) -> Any:
+    winner: Any,
+    cloud_winner: Any,
+) -> None:
+    blocks = (len(tiles) + _BLOCK - 1) // _BLOCK
+    free = Scratch(
+        np.empty((3, scratch_size)),
+        np.empty(scratch_size, np.int64),
+        np.empty(scratch_size),
+        np.empty(scratch_size, np.int64),
+    )
+    for block in range(chunk, blocks, CHUNKS):
+        for t in range(block * _BLOCK, min((block + 1) * _BLOCK, len(tiles))):
+            _work_on_tile(
+                lattice,
+                entries,
+                rows_near,
+                rows_far,
+                sites,
+                buds,
+                envelopes,
+                cloud,
+                gone,
+                release,
+                tiles[t],
+                free,
+                winner[t],
+                cloud_winner,
+            )
+
+
+@driver
+def _compete_chunks(
+    first: Any,
+    step: Any,
+    lattice: Any,
+    entries: Any,
+    rows_near: Any,
+    rows_far: Any,
+    sites: Any,
+    buds: Any,
+    envelopes: Any,
+    cloud: Any,
+    gone: Any,
+    release: Any,
+    tiles: Any,
+    scratch_size: Any,
+    winner: Any,
+    cloud_winner: Any,
+) -> None:
+    for chunk in range(first, CHUNKS, step):
+        _compete_chunk(
+            chunk,
+            lattice,
+            entries,
+            rows_near,
+            rows_far,
+            sites,
+            buds,
+            envelopes,
+            cloud,
+            gone,
+            release,
+            tiles,
+            scratch_size,
+            winner,
+            cloud_winner,
+        )
+
+
+def compete(
+    lattice: Lattice,
+    entries: Entries,
+    rows_near: Rows,
+    rows_far: Rows,
+    sites: Sites,
+    buds: Buds,
+    envelopes: Envelopes,
+    cloud: Cloud,
+    gone: Gone,
+    release: bool,
+    tiles: NDArray[np.int64],
+    scratch_size: int,
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Take the markers near buds and give the free ones to buds.
 
     Parameters
@@ -315,30 +405,21 @@ def compete(
     """
     winner = np.empty((len(tiles), CELLS), np.int32)
     cloud_winner = np.full(len(cloud.point), -1, np.int32)
-    blocks = (len(tiles) + _BLOCK - 1) // _BLOCK
-    for c in prange(CHUNKS):
-        free = Scratch(
-            np.empty((3, scratch_size)),
-            np.empty(scratch_size, np.int64),
-            np.empty(scratch_size),
-            np.empty(scratch_size, np.int64),
-        )
-        for block in range(c, blocks, CHUNKS):
-            for t in range(block * _BLOCK, min((block + 1) * _BLOCK, len(tiles))):
-                _work_on_tile(
-                    lattice,
-                    entries,
-                    rows_near,
-                    rows_far,
-                    sites,
-                    buds,
-                    envelopes,
-                    cloud,
-                    gone,
-                    release,
-                    tiles[t],
-                    free,
-                    winner[t],
-                    cloud_winner,
-                )
+    in_threads(
+        _compete_chunks,
+        lattice,
+        entries,
+        rows_near,
+        rows_far,
+        sites,
+        buds,
+        envelopes,
+        cloud,
+        gone,
+        release,
+        tiles,
+        scratch_size,
+        winner,
+        cloud_winner,
+    )
     return winner, cloud_winner

@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.random import STREAM_MARKER, philox
 
 #: Cells along the edge of a tile, and in it: the 64 of them share one word of "gone" bits.
@@ -237,12 +237,12 @@ def row_bounds(lattice: Any, first: Any, rows: Any, r: Any, x: Any, y: Any, z: A
     return first[row - half], first[row + half + 1]
 
 
-@njit_parallel
-def reached_tiles(lattice: Any, first: Any, rows: Any, gone: Any, use_gone: Any) -> Any:
-    """Flag the tiles that have buds within reach and markers left."""
-    nx, ny, nz = lattice.shape
-    flags = np.zeros((nz, ny, nx), np.uint8)
-    for line in prange(nz * ny):
+@driver
+def _reach_lines(
+    start: Any, step: Any, lattice: Any, first: Any, rows: Any, gone: Any, use_gone: Any, flags: Any
+) -> None:
+    nz, ny, nx = flags.shape
+    for line in range(start, nz * ny, step):
         z = line // ny
         y = line % ny
         for x in range(nx):
@@ -251,8 +251,17 @@ def reached_tiles(lattice: Any, first: Any, rows: Any, gone: Any, use_gone: Any)
                 if word == np.uint64(0xFFFFFFFFFFFFFFFF):
                     continue
             for r in range(len(rows.offset)):
-                start, end = row_bounds(lattice, first, rows, r, x, y, z)
-                if end > start:
+                here, end = row_bounds(lattice, first, rows, r, x, y, z)
+                if end > here:
                     flags[z, y, x] = 1
                     break
+
+
+def reached_tiles(
+    lattice: Lattice, first: NDArray[np.int64], rows: Rows, gone: Gone, use_gone: bool
+) -> NDArray[np.uint8]:
+    """Flag the tiles that have buds within reach and markers left."""
+    nx, ny, nz = lattice.shape
+    flags = np.zeros((nz, ny, nx), np.uint8)
+    in_threads(_reach_lines, lattice, first, rows, gone, use_gone, flags)
     return flags

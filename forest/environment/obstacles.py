@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import inline
+from forest._jit import njit
 from forest.environment.canopy import CanopyField
 from forest.errors import InputError
 
@@ -68,7 +68,7 @@ class Solid(NamedTuple):
     shape: NDArray[np.int64]
 
 
-@inline
+@njit
 def solid_at(solid: Any, ix: Any, iy: Any, iz: Any) -> Any:
     """Tell whether a near-field voxel lies inside an obstacle."""
     mask = solid.mask

@@ -9,13 +9,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import inline, njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.environment.canopy import CanopyField, coarse, frame_of, layers_above
 from forest.environment.light_grid import ShadowField, place_in, window_of
-from forest.environment.voxels import HANDS, count_buds, site_voxel, wrap
+from forest.environment.voxels import HANDS, Blocks, count_buds, site_voxel, wrap
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
 
 #: The plot's rows are cut into this many slabs; each is filled by one thread.
 SLABS = 4
@@ -39,13 +41,13 @@ class Plot(NamedTuple):
     slab_rows: int
 
 
-@inline
+@njit
 def _three(column: Any, row: Any) -> Any:
     """Take the three numbers of a row out of its array, for use in loops."""
     return column[row, 0], column[row, 1], column[row, 2]
 
 
-@inline
+@njit
 def _misses(low: Any, high: Any, first: Any, last: Any, plot: Any) -> Any:
     """Tell whether the rows low..high, wrapped on a torus, miss the rows first..last - 1."""
     if not plot.periodic:
@@ -105,8 +107,10 @@ def _deposit_block(
             leaves[z, y, x] += leaf * buds
 
 
-@njit_parallel
-def deposit(
+@driver
+def _deposit_slabs(
+    start: Any,
+    step: Any,
     metamers: Any,
     trees: Any,
     blocks: Any,
@@ -116,8 +120,7 @@ def deposit(
     far: Any,
     units: Any,
 ) -> None:
-    """Add all living buds to the near and far grids; each slab of rows belongs to one thread."""
-    for slab in prange(SLABS):
+    for slab in range(start, SLABS, step):
         first = plot.first_row + slab * plot.slab_rows
         last = first + plot.slab_rows
         for block in range(len(blocks.tree)):
@@ -136,6 +139,20 @@ def deposit(
                 far,
                 units,
             )
+
+
+def deposit(
+    metamers: Metamers,
+    trees: Trees,
+    blocks: Blocks,
+    bounds: NDArray[np.int64],
+    plot: Plot,
+    near: ShadowField,
+    far: CanopyField,
+    units: Units,
+) -> None:
+    """Add all living buds to the near and far grids; each slab of rows belongs to one thread."""
+    in_threads(_deposit_slabs, metamers, trees, blocks, bounds, plot, near, far, units)
 
 
 @njit
@@ -186,8 +203,10 @@ def _read_block(
         light[k] = np.float32(found)
 
 
-@njit_parallel
-def read_light(
+@driver
+def _read_chunks(
+    first: Any,
+    step: Any,
     metamers: Any,
     trees: Any,
     blocks: Any,
@@ -197,13 +216,27 @@ def read_light(
     units: Any,
     full_light: Any,
 ) -> None:
-    """Set `metamers.light` of every node; 0 where no bud lives."""
-    for hand in prange(HANDS):
-        for block in range(hand, len(blocks.tree), HANDS):
+    n = len(blocks.tree)
+    for hand in range(first, HANDS, step):
+        for block in range(n * hand // HANDS, n * (hand + 1) // HANDS):
             tree = blocks.tree[block]
             own = near.unit * units.shade[trees.species[tree]] * near.weights[0]
             sites = (blocks.first[block], blocks.last[block])
             _read_block(metamers, trees, tree, sites, plot, near, far, full_light + own)
+
+
+def read_light(
+    metamers: Metamers,
+    trees: Trees,
+    blocks: Blocks,
+    plot: Plot,
+    near: ShadowField,
+    far: CanopyField,
+    units: Units,
+    full_light: float,
+) -> None:
+    """Set `metamers.light` of every node; 0 where no bud lives."""
+    in_threads(_read_chunks, metamers, trees, blocks, plot, near, far, units, full_light)
 
 
 def no_shadow() -> ShadowField:

@@ -10,22 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import njit_parallel
 from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
 from forest.environment.marker_buds import BudSpace, apply_space
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
 from forest.environment.obstacles import Box, Mesh, Solid
+from forest.trees.buds import Shoots
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
 
 if TYPE_CHECKING:
-    from forest.growth.shoots import Shoots
     from forest.scenario import Scenario
-
-_CHUNKS = 64
 
 
 class Surroundings:
@@ -105,20 +101,15 @@ class Surroundings:
             apply_space(metamers, trees, space)
             self._space = _by_serial(metamers, trees, space)
 
-    def directions(
-        self, metamers: Metamers, trees: Trees, shoots: Shoots, heading: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
+    def directions(self, metamers: Metamers, trees: Trees, shoots: Shoots) -> NDArray[np.float32]:
         """Give the optimal direction V of each shooting bud, float32 (n, 3); zero without one."""
-        n_trees = len(trees.tree_id)
-        row = np.repeat(np.arange(n_trees), np.diff(shoots.first))
-        if self._space is not None:
-            keys, direction = self._space
-            serial = metamers.serial[trees.start[row] + shoots.metamer]
-            wanted = _key(trees.tree_id[row], serial, shoots.bud)
-            return direction[np.searchsorted(keys, wanted)]
-        voxel = np.empty((len(row), 3), np.int32)
-        _voxels(metamers, trees, row, shoots.metamer, np.float32(self.voxel_m), voxel)
-        return self._light.directions(trees.species[row], voxel, heading)
+        if self._space is None:
+            return self._light.directions(metamers, trees, shoots)
+        keys, direction = self._space
+        row = np.repeat(np.arange(len(trees.tree_id)), np.diff(shoots.first))
+        serial = metamers.serial[trees.start[row] + shoots.metamer]
+        wanted = _key(trees.tree_id[row], serial, shoots.bud)
+        return direction[np.searchsorted(keys, wanted)]
 
     def floor_light(self) -> float:
         """Mean relative irradiance at the ground, 0..1; NaN without a far field."""
@@ -153,15 +144,3 @@ def _by_serial(
     """Key each bud's direction by serial, so that it is found after shedding moved metamers."""
     serial = metamers.serial[trees.start[space.tree_row] + space.metamer]
     return _key(trees.tree_id[space.tree_row], serial, space.kind), space.direction
-
-
-@njit_parallel
-def _voxels(metamers: Any, trees: Any, row: Any, metamer: Any, voxel_m: Any, out: Any) -> None:
-    """Find the near-field voxel of each shooting bud, as the light does: in float32."""
-    n = len(row)
-    for c in prange(_CHUNKS):
-        for j in range(n * c // _CHUNKS, n * (c + 1) // _CHUNKS):
-            i = trees.start[row[j]] + metamer[j]
-            for k in range(3):
-                place = trees.base_offset[row[j], k] + metamers.tip[i, k]
-                out[j, k] = trees.base_voxel[row[j], k] + np.int32(np.floor(place / voxel_m))

@@ -15,10 +15,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import inline, njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 
 #: Directions are dealt to this many groups, whatever the number of threads.
 GROUPS = 4
@@ -71,7 +71,7 @@ def make_rays(directions: NDArray[np.float64], weights: NDArray[np.float64]) -> 
     )
 
 
-@inline
+@njit
 def _transmit(depth: Any) -> Any:
     """Compute exp(-depth) for depth >= 0 in float32, without a call so that rows vectorise.
 
@@ -167,8 +167,52 @@ def _sweep_direction(
             ground[y, x] += weight * light
 
 
-@njit_parallel
-def sweep(depth: Any, rays: Any, periodic: Any, result: Any, ground: Any) -> None:
+@njit
+def _sweep_group(
+    group: Any, depth: Any, rays: Any, periodic: Any, result: Any, ground: Any
+) -> None:
+    _, ny, nx = depth.shape
+    planes = np.empty((2, ny + 2, nx + 2), np.float32)
+    for d in range(group, len(rays.steps), GROUPS):
+        _sweep_direction(d, depth, rays, planes, periodic, result, ground)
+
+
+@driver
+def _sweep_groups(
+    first: Any, step: Any, depth: Any, rays: Any, periodic: Any, results: Any, grounds: Any
+) -> None:
+    for group in range(first, GROUPS, step):
+        _sweep_group(group, depth, rays, periodic, results[group], grounds[group])
+
+
+@driver
+def _add_groups(
+    first: Any, step: Any, results: Any, grounds: Any, result: Any, ground: Any
+) -> None:
+    """Add the groups' sums in order: the same bits for any number of threads."""
+    nz, ny, nx = result.shape
+    one = np.float32(1.0)
+    for y in range(first, ny, step):
+        for z in range(nz):
+            for x in range(nx):
+                total = np.float32(0.0)
+                for group in range(GROUPS):
+                    total += results[group, z, y, x]
+                result[z, y, x] = min(total, one)
+        for x in range(nx):
+            total = np.float32(0.0)
+            for group in range(GROUPS):
+                total += grounds[group, y, x]
+            ground[y, x] = min(total, one)
+
+
+def sweep(
+    depth: NDArray[np.float32],
+    rays: Rays,
+    periodic: int,
+    result: NDArray[np.float32],
+    ground: NDArray[np.float32],
+) -> None:
     """Compute the relative irradiance of all voxels and of the ground.
 
     Parameters
@@ -183,27 +227,8 @@ def sweep(depth: Any, rays: Any, periodic: Any, result: Any, ground: Any) -> Non
     ground : float32 (ny, nx)
         Out: T below the lowest layer, at most 1.
     """
-    nz, ny, nx = depth.shape
-    n = len(rays.steps)
-    # Each group of directions has sums of its own, which are added in order: a few threads that
-    # never wait for each other, and the same bits for any number of them.
-    results = np.zeros((GROUPS, nz, ny, nx), np.float32)
-    grounds = np.zeros((GROUPS, ny, nx), np.float32)
-    for group in prange(GROUPS):
-        planes = np.empty((2, ny + 2, nx + 2), np.float32)
-        for d in range(group, n, GROUPS):
-            _sweep_direction(d, depth, rays, planes, periodic, results[group], grounds[group])
-    one = np.float32(1.0)
-    for z in range(nz):
-        for y in range(ny):
-            for x in range(nx):
-                total = np.float32(0.0)
-                for group in range(GROUPS):
-                    total += results[group, z, y, x]
-                result[z, y, x] = min(total, one)
-    for y in range(ny):
-        for x in range(nx):
-            total = np.float32(0.0)
-            for group in range(GROUPS):
-                total += grounds[group, y, x]
-            ground[y, x] = min(total, one)
+    # Each group of directions has sums of its own: a few threads that never wait for each other.
+    results = np.zeros((GROUPS, *depth.shape), np.float32)
+    grounds = np.zeros((GROUPS, *depth.shape[1:]), np.float32)
+    in_threads(_sweep_groups, depth, rays, periodic, results, grounds)
+    in_threads(_add_groups, results, grounds, result, ground)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import inline, njit, njit_parallel
-from forest.trees.metamers import LATERAL, TERMINAL
+from forest._jit import driver, njit
+from forest._threads import in_threads
+from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
 
 #: Sites per block: small enough to balance threads, large enough to hide the loop's cost.
 BLOCK = 2048
-#: Hands to which blocks are dealt in turn; fixed, so that no result depends on the threads.
+#: Hands among which blocks are dealt, in their order; fixed, so that no result depends on threads.
 HANDS = 64
 
 
@@ -40,7 +40,7 @@ def deal_blocks(trees: Trees) -> Blocks:
     return Blocks(tree, first, last)
 
 
-@inline
+@njit
 def count_buds(state: Any) -> Any:
     """Count the living buds at a node: 0, 1 or 2."""
     n = 0
@@ -51,7 +51,7 @@ def count_buds(state: Any) -> Any:
     return n
 
 
-@inline
+@njit
 def site_voxel(base_voxel: Any, base_offset: Any, tip: Any, voxel_m: Any) -> Any:
     """Find the voxel of one coordinate of a site.
 
@@ -61,7 +61,7 @@ def site_voxel(base_voxel: Any, base_offset: Any, tip: Any, voxel_m: Any) -> Any
     return np.int64(base_voxel) + np.int64(np.floor((base_offset + tip) / voxel_m))
 
 
-@inline
+@njit
 def wrap(index: Any, n: Any) -> Any:
     """Bring an index into 0..n-1 on a torus; the division is rarely needed."""
     if index < 0 or index >= n:
@@ -89,19 +89,13 @@ def _bound_tips(metamers: Any, first: Any, last: Any) -> Any:
     return (x0, y0, z0), (x1, y1, z1)
 
 
-@njit_parallel
-def bound_blocks(metamers: Any, trees: Any, blocks: Any, voxel_m: Any) -> Any:
-    """Bound the voxels of the living buds of each block.
-
-    Returns
-    -------
-    int64 (blocks, 6)
-        Lowest and highest ix, iy, iz, not wrapped; lowest above highest where no bud lives.
-    """
+@driver
+def _bound_chunks(
+    first: Any, step: Any, metamers: Any, trees: Any, blocks: Any, voxel_m: Any, bounds: Any
+) -> None:
     n = len(blocks.tree)
-    bounds = np.empty((n, 6), np.int64)
-    for hand in prange(HANDS):
-        for block in range(hand, n, HANDS):
+    for hand in range(first, HANDS, step):
+        for block in range(n * hand // HANDS, n * (hand + 1) // HANDS):
             tree = blocks.tree[block]
             low, high = _bound_tips(metamers, blocks.first[block], blocks.last[block])
             for axis in range(3):
@@ -112,4 +106,18 @@ def bound_blocks(metamers: Any, trees: Any, blocks: Any, voxel_m: Any) -> Any:
                     offset = trees.base_offset[tree, axis]
                     bounds[block, 2 * axis] = site_voxel(base, offset, low[axis], voxel_m)
                     bounds[block, 2 * axis + 1] = site_voxel(base, offset, high[axis], voxel_m)
+
+
+def bound_blocks(
+    metamers: Metamers, trees: Trees, blocks: Blocks, voxel_m: np.float32
+) -> NDArray[np.int64]:
+    """Bound the voxels of the living buds of each block.
+
+    Returns
+    -------
+    int64 (blocks, 6)
+        Lowest and highest ix, iy, iz, not wrapped; lowest above highest where no bud lives.
+    """
+    bounds = np.empty((len(blocks.tree), 6), np.int64)
+    in_threads(_bound_chunks, metamers, trees, blocks, voxel_m, bounds)
     return bounds

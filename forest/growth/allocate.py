@@ -7,10 +7,11 @@ One driver runs over the trees; what happens to one tree reads from top to botto
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
+from numpy.typing import NDArray
 
 from forest import random
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.growth.balance import hand_up, hand_up_priced, know_limbs, trunk_growth, wood_of
 from forest.growth.bud_fate import gather_light, share_borchert_honda, share_priority
 from forest.growth.budget import (
@@ -316,28 +317,11 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
         _hold_back(arena, s, e, t, sp, year, trees.tree_id[row])
 
 
-@njit_parallel
-def allocate(
-    arena: Metamers,
-    trees: Trees,
-    shared: Deal,
-    scratch: Scratch,
-    traits: SpeciesTraits,
-    year: Year,
-    accounts,
-    paper,
-    priority,
-    balance,
+@driver
+def _allocate_chunks(
+    first, step, arena, trees, shared, scratch, traits, year, accounts, paper, priority, balance
 ):  # type: ignore[no-untyped-def]
-    """Allocate the year's resource in every tree.
-
-    `paper` is True, or None for the mass balance; `priority` and `balance` are True for these
-    models, None both for Borchert-Honda. What hangs on a None is not compiled.
-
-    Sets `arena.resource` (v of each bud; in mass-balance mode with the carried fraction) and, in
-    mass-balance mode, books income, leaves, upkeep and spend in `accounts` (trees, ACCOUNTS).
-    """
-    for b in prange(BINS):
+    for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             n = np.int64(trees.size[row])
@@ -351,3 +335,38 @@ def allocate(
                 )
             else:
                 _allocate_paper(arena, trees, row, traits, year, priority, balance, work, ints)
+
+
+def allocate(
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    scratch: Scratch,
+    traits: SpeciesTraits,
+    year: Year,
+    accounts: NDArray[np.float64],
+    paper: bool | None,
+    priority: bool | None,
+    balance: bool | None,
+) -> None:
+    """Allocate the year's resource in every tree.
+
+    `paper` is True, or None for the mass balance; `priority` and `balance` are True for these
+    models, None both for Borchert-Honda. What hangs on a None is not compiled.
+
+    Sets `arena.resource` (v of each bud; in mass-balance mode with the carried fraction) and, in
+    mass-balance mode, books income, leaves, upkeep and spend in `accounts` (trees, ACCOUNTS).
+    """
+    in_threads(
+        _allocate_chunks,
+        arena,
+        trees,
+        shared,
+        scratch,
+        traits,
+        year,
+        accounts,
+        paper,
+        priority,
+        balance,
+    )

@@ -100,7 +100,7 @@ def cone_volume(length, base, tip):  # type: ignore[no-untyped-def]
 
 @njit
 def cone_centre(base, tip):  # type: ignore[no-untyped-def]
-    """Place of a truncated cone's centre of mass: 0 at its base, 1 at its tip (eq. 11, cancelled)."""
+    """Place of a truncated cone's centre of mass (eq. 11, cancelled): 0 base, 1 tip."""
     square = base * base + base * tip + tip * tip
     return (base * base + 2.0 * base * tip + 3.0 * tip * tip) / (4.0 * square)
 

@@ -10,9 +10,10 @@ balance model in paper mode axes are cones (Hart & Baker 2003).
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
+from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.growth.allocate import income_rate, tree_part, unit_costs
 from forest.growth.balance import know_limbs, lay_cones, wood_of
 from forest.growth.budget import (
@@ -194,18 +195,9 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work, ints):  # type
     )
 
 
-@njit_parallel
-def thicken(
-    arena: Metamers,
-    trees: Trees,
-    shared: Deal,
-    scratch: Scratch,
-    traits: SpeciesTraits,
-    year: Year,
-    accounts,
-):  # type: ignore[no-untyped-def]
-    """Thicken all trees; in mass-balance mode book extension and ring in `accounts`."""
-    for b in prange(BINS):
+@driver
+def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, accounts):  # type: ignore[no-untyped-def]
+    for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             n = np.int64(trees.size[row])
@@ -236,3 +228,16 @@ def thicken(
                 g = shared.place[b] * INTEGERS
                 ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
                 _thicken_balanced(arena, trees, row, traits, year, accounts, work, ints)
+
+
+def thicken(
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    scratch: Scratch,
+    traits: SpeciesTraits,
+    year: Year,
+    accounts: NDArray[np.float64],
+) -> None:
+    """Thicken all trees; in mass-balance mode book extension and ring in `accounts`."""
+    in_threads(_thicken_chunks, arena, trees, shared, scratch, traits, year, accounts)

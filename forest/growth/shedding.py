@@ -7,9 +7,9 @@ mass-balance mode a part without a living site is dropped as well, whatever its 
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.growth.bud_fate import lit_buds
 from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
 from forest.growth.parameters import SpeciesTraits
@@ -143,17 +143,9 @@ def _shed_tree(arena, trees, row, t, drop_bare, work, ints):  # type: ignore[no-
         trees.size[row] = close_ranks(arena, s, n, ints[2], ints[0])
 
 
-@njit_parallel
-def shed(  # type: ignore[no-untyped-def]
-    arena: Metamers,
-    trees: Trees,
-    shared: Deal,
-    scratch: Scratch,
-    traits: SpeciesTraits,
-    drop_bare,
-):
-    """Drop the branches of all trees that earn too little, and compact what stays."""
-    for b in prange(BINS):
+@driver
+def _shed_chunks(first, step, arena, trees, shared, scratch, traits, drop_bare):  # type: ignore[no-untyped-def]
+    for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             n = np.int64(trees.size[row])
@@ -162,3 +154,15 @@ def shed(  # type: ignore[no-untyped-def]
             work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
             ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
             _shed_tree(arena, trees, row, traits, drop_bare, work, ints)
+
+
+def shed(
+    arena: Metamers,
+    trees: Trees,
+    shared: Deal,
+    scratch: Scratch,
+    traits: SpeciesTraits,
+    drop_bare: bool,
+) -> None:
+    """Drop the branches of all trees that earn too little, and compact what stays."""
+    in_threads(_shed_chunks, arena, trees, shared, scratch, traits, drop_bare)

@@ -7,14 +7,12 @@ obstacles.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from forest import random
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.environment.obstacles import Solid, solid_at
 from forest.growth.curves import curve
 from forest.growth.dealing import BINS, Deal
@@ -27,33 +25,11 @@ from forest.growth.parameters import (
     Year,
 )
 from forest.random import STREAM_PHYLLOTAXIS, STREAM_SHOOT
+from forest.trees.buds import LATERAL_BUD, TERMINAL_BUD, Shoots, bud_heading
 from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
 
-TERMINAL_BUD = 0
-LATERAL_BUD = 1
 _STACK = 64
-
-
-class Shoots(NamedTuple):
-    """The buds that shoot this year, in order of tree, metamer and bud.
-
-    Attributes
-    ----------
-    first : int64 (trees + 1,)
-        `first[r]:first[r + 1]` are the shoots of tree row r.
-    metamer : int32 (n,)
-        Metamer that bears the bud, relative to the tree's extent.
-    bud : uint8 (n,)
-        TERMINAL_BUD or LATERAL_BUD.
-    new : int64 (trees,)
-        Metamers that each tree can gain at most.
-    """
-
-    first: NDArray[np.int64]
-    metamer: NDArray[np.int32]
-    bud: NDArray[np.uint8]
-    new: NDArray[np.int64]
 
 
 @njit
@@ -67,9 +43,9 @@ def _fraction(v):  # type: ignore[no-untyped-def]
     return min(v - np.floor(v), 0.9999999)
 
 
-@njit_parallel
-def _count(arena: Metamers, trees: Trees, shared: Deal, traits: SpeciesTraits, shoots, new):  # type: ignore[no-untyped-def]
-    for b in prange(BINS):
+@driver
+def _count(first, step, arena, trees, shared, traits, shoots, new):  # type: ignore[no-untyped-def]
+    for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             most = np.int64(traits.of[trees.species[row]].max_metamers)
@@ -84,9 +60,9 @@ def _count(arena: Metamers, trees: Trees, shared: Deal, traits: SpeciesTraits, s
             new[row] = metamers
 
 
-@njit_parallel
-def _list(arena: Metamers, trees: Trees, shared: Deal, first, metamer, bud_kind):  # type: ignore[no-untyped-def]
-    for b in prange(BINS):
+@driver
+def _list(begin, step, arena, trees, shared, first, metamer, bud_kind):  # type: ignore[no-untyped-def]
+    for b in range(begin, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             at = first[row]
@@ -104,51 +80,13 @@ def shooting_buds(arena: Metamers, trees: Trees, shared: Deal, traits: SpeciesTr
     n = len(trees.tree_id)
     count = np.zeros(n, np.int64)
     new = np.zeros(n, np.int64)
-    _count(arena, trees, shared, traits, count, new)
+    in_threads(_count, arena, trees, shared, traits, count, new)
     first = np.zeros(n + 1, np.int64)
     np.cumsum(count, out=first[1:])
     metamer = np.empty(first[-1], np.int32)
     bud = np.empty(first[-1], np.uint8)
-    _list(arena, trees, shared, first, metamer, bud)
+    in_threads(_list, arena, trees, shared, first, metamer, bud)
     return Shoots(first, metamer, bud, new)
-
-
-@njit
-def bud_heading(arena, s, i, bud):  # type: ignore[no-untyped-def]
-    """Direction of a bud: of its internode (terminal), or as phyllotaxis made it (lateral)."""
-    if bud == LATERAL_BUD:
-        return (
-            np.float64(arena.bud[s + i, 0]),
-            np.float64(arena.bud[s + i, 1]),
-            np.float64(arena.bud[s + i, 2]),
-        )
-    x = np.float64(arena.tip[s + i, 0])
-    y = np.float64(arena.tip[s + i, 1])
-    z = np.float64(arena.tip[s + i, 2])
-    p = arena.parent[s + i]
-    if p >= 0:
-        x -= arena.tip[s + p, 0]
-        y -= arena.tip[s + p, 1]
-        z -= arena.tip[s + p, 2]
-    norm = np.sqrt(x * x + y * y + z * z)
-    if norm == 0.0:
-        return 0.0, 0.0, 1.0
-    return x / norm, y / norm, z / norm
-
-
-@njit_parallel
-def headings(arena: Metamers, trees: Trees, shared: Deal, shoots: Shoots, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (n, 3) with the directions of the shooting buds."""
-    for b in prange(BINS):
-        for k in range(shared.first[b], shared.first[b + 1]):
-            row = shared.rows[k]
-            for j in range(shoots.first[row], shoots.first[row + 1]):
-                x, y, z = bud_heading(
-                    arena, trees.start[row], np.int64(shoots.metamer[j]), np.int64(shoots.bud[j])
-                )
-                out[j, 0] = x
-                out[j, 1] = y
-                out[j, 2] = z
 
 
 @njit
@@ -362,18 +300,24 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
     trees.size[row] = end
 
 
-@njit_parallel
+@driver
+def _extend_chunks(first, step, arena, trees, shared, shoots, toward, traits, year, solid, voxel_m):  # type: ignore[no-untyped-def]
+    for b in range(first, BINS, step):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            _extend_tree(arena, trees, shared.rows[k], shoots, toward, traits, year, solid, voxel_m)
+
+
 def extend(
     arena: Metamers,
     trees: Trees,
     shared: Deal,
     shoots: Shoots,
-    toward,
+    toward: NDArray[np.float32],
     traits: SpeciesTraits,
     year: Year,
     solid: Solid,
-    voxel_m,
-):  # type: ignore[no-untyped-def]
+    voxel_m: float,
+) -> None:
     """Grow the shoots of all trees. Every extent must have room for `shoots.new` more metamers.
 
     Parameters
@@ -383,9 +327,7 @@ def extend(
     voxel_m : float
         Edge of the voxels of `solid`, m.
     """
-    for b in prange(BINS):
-        for k in range(shared.first[b], shared.first[b + 1]):
-            _extend_tree(arena, trees, shared.rows[k], shoots, toward, traits, year, solid, voxel_m)
+    in_threads(_extend_chunks, arena, trees, shared, shoots, toward, traits, year, solid, voxel_m)
 
 
 @njit

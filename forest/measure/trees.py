@@ -14,10 +14,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from forest._jit import njit, njit_parallel
+from forest._jit import driver, njit
+from forest._threads import in_threads
 from forest.trees.metamers import CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
 
@@ -183,12 +183,19 @@ def _measure_tree(
         out.breast_radius_m[t] = 0.5 * under
 
 
-@njit_parallel
+@driver
 def _measure_all(
-    metamers: Any, trees: Any, species: Any, full_light: Any, by_size: Any, out: Any
-) -> Any:
+    first: Any,
+    step: Any,
+    metamers: Any,
+    trees: Any,
+    species: Any,
+    full_light: Any,
+    by_size: Any,
+    out: Any,
+) -> None:
     """Measure all trees; they are dealt to bins from the largest to the smallest."""
-    for b in prange(_BINS):
+    for b in range(first, _BINS, step):
         for k in range(b, len(by_size), _BINS):
             _measure_tree(metamers, trees, species, full_light, by_size[k], out)
 
@@ -232,5 +239,5 @@ def measure_trees(
     columns["breast_radius_m"] = np.empty(n, np.float32)
     out = TreeMeasures(**columns)
     by_size = np.argsort(-trees.size, kind="stable")
-    _measure_all(metamers, trees, species, float(full_light), by_size, out)
+    in_threads(_measure_all, metamers, trees, species, float(full_light), by_size, out)
     return out

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from forest._threads import share_out
+
 # Bits of Metamers.state
 MAIN = np.uint8(1)  # continues its parent's axis (else it starts an axis of its own)
 TERMINAL = np.uint8(2)  # bears a living terminal bud
@@ -115,17 +117,25 @@ class Arena:
             return
         target = wanted[short] + (wanted[short] * self.SLACK).astype(np.int64) + 4
         if self.used + int(target.sum()) <= self.capacity:
-            for tree, length in zip(short, target, strict=True):
-                self._move(int(start[tree]), self.used, int(size[tree]))
-                start[tree] = self.used
-                room[tree] = length
-                self.used += int(length)
+            place = self.used + np.cumsum(target) - target
+            self._move(start[short], place, size[short])
+            start[short] = place
+            room[short] = target
+            self.used += int(target.sum())
             return
         self._repack(start, size, room, wanted)
 
-    def _move(self, source: int, to: int, n: int) -> None:
-        for field in self.metamers:
-            field[to : to + n] = field[source : source + n]
+    def _move(
+        self, source: NDArray[np.int64], to: NDArray[np.int64], size: NDArray[np.int32]
+    ) -> None:
+        """Move extents one after the other; each field by one thread."""
+        moves = list(zip(source.tolist(), to.tolist(), size.tolist(), strict=True))
+
+        def move(field: NDArray[Any]) -> None:
+            for start, end, n in moves:
+                field[end : end + n] = field[start : start + n]
+
+        share_out(move, self.metamers)
 
     def _repack(
         self,
@@ -147,10 +157,10 @@ class Arena:
             self._grow(int(total * self.GROWTH), self.used)
         place = np.empty(len(start), np.int64)
         place[by_place] = np.concatenate(([0], np.cumsum(length[by_place])[:-1]))
-        down = [tree for tree in by_place if place[tree] < start[tree]]
-        up = [tree for tree in by_place[::-1] if place[tree] > start[tree]]
-        for tree in down + up:
-            self._move(int(start[tree]), int(place[tree]), int(size[tree]))
+        down = by_place[place[by_place] < start[by_place]]
+        up = by_place[place[by_place] > start[by_place]][::-1]
+        moving = np.concatenate((down, up))
+        self._move(start[moving], place[moving], size[moving])
         start[:] = place
         room[:] = length
         self.used = total

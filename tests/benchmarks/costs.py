@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 
+from forest._threads import most_threads, using_threads
 from tests.benchmarks import machine
 from tests.benchmarks.stands import (
     ClockedStand,
@@ -26,7 +26,7 @@ _TIMED_YEARS = 2
 
 def thread_counts() -> list[int]:
     """One thread and two, where there are two."""
-    return [1, 2] if numba.config.NUMBA_NUM_THREADS > 1 else [1]
+    return [1, 2] if most_threads() > 1 else [1]
 
 
 def measure_stand(tile_path: str, across: int, rounds: int) -> dict[str, Any]:
@@ -54,11 +54,11 @@ def measure_stand(tile_path: str, across: int, rounds: int) -> dict[str, Any]:
     ends = set()
     for _ in range(rounds):
         for threads in thread_counts():
-            stand, timed = _grow(saved, threads)
+            with using_threads(threads):
+                stand, timed = _grow(saved)
             years[threads].append(timed)
             ends.add(fingerprint(stand))
             del stand
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     result["same_bits"] = len(ends) == 1
     result["memory"] = years[thread_counts()[-1]][-1]["memory"]
     result["threads"] = {
@@ -80,9 +80,8 @@ def _describe(saved: Saved) -> dict[str, Any]:
     }
 
 
-def _grow(saved: Saved, threads: int) -> tuple[ClockedStand, dict[str, Any]]:
+def _grow(saved: Saved) -> tuple[ClockedStand, dict[str, Any]]:
     """Restore the stand, grow it, and give the times and the memory of the timed years."""
-    numba.set_num_threads(threads)
     before = machine.resident_bytes()
     stand = saved.restore()
     stand.step()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import get_num_threads, set_num_threads
 
+from forest._threads import using_threads
 from forest.environment.canopy import Canopy
 from forest.environment.sky import sky_directions, sun_directions
 from tests.reference.canopy import relative_irradiance
@@ -92,15 +92,11 @@ def test_light_enters_an_open_plot_from_the_sides():
 def test_same_bits_for_any_thread_count():
     leaf = np.random.default_rng(5).uniform(0.0, 2.0, (5, 5, 6))
     fields = []
-    threads = get_num_threads()
-    try:
-        for n in (1, threads):
-            set_num_threads(n)
+    for n in (1, 2):
+        with using_threads(n):
             canopy = make_canopy(sky_directions(17))
             illuminate(canopy, leaf)
             fields.append(canopy.transmission)
-    finally:
-        set_num_threads(threads)
     assert np.array_equal(*fields)
 
 

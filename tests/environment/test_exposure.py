@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import get_num_threads, set_num_threads
 
+from forest._threads import using_threads
 from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
 from forest.environment.obstacles import Box
 from forest.errors import InputError
+from forest.trees.buds import Shoots
 from forest.trees.metamers import LATERAL, TERMINAL
 from tests.builders import random_arena
+from tests.reference import markers
 from tests.reference.shadow import (
     best_gradient,
     least_shadowed,
@@ -48,6 +50,19 @@ def make_stand(seed: int, n_trees: int = 3, n_per_tree: int = 25):
     return random_arena(
         np.random.default_rng(seed), n_trees, n_per_tree, size_m=(4.0, 3.0), n_species=2
     )
+
+
+def every_bud(metamers, trees) -> tuple[Shoots, np.ndarray]:
+    """All living buds as if they shot, and their headings."""
+    buds = markers.living_buds(metamers, trees)
+    rows = np.array([b["row"] for b in buds], np.int64)
+    shoots = Shoots(
+        np.searchsorted(rows, np.arange(len(trees.size) + 1)),
+        np.array([b["metamer"] for b in buds], np.int32),
+        np.array([b["kind"] for b in buds], np.uint8),
+        np.ones(len(trees.size), np.int64),
+    )
+    return shoots, np.array([b["heading"] for b in buds], np.float32)
 
 
 def sites(trees) -> np.ndarray:
@@ -87,13 +102,8 @@ def test_directions_equal_twin(seed, periodic, mode):
     light.expose(metamers, trees)
     listed = living_buds(metamers, trees, 0.25)
     rng = np.random.default_rng(seed)
-    headings = rng.normal(size=(len(listed), 3))
-    headings = (headings / np.linalg.norm(headings, axis=1)[:, None]).astype(np.float32)
-    found = light.directions(
-        np.array([s for _, s, _ in listed], np.int16),
-        np.array([v for _, _, v in listed], np.int32).reshape(-1, 3),
-        headings,
-    )
+    shoots, headings = every_bud(metamers, trees)
+    found = light.directions(metamers, trees, shoots)
     assert found.dtype == np.float32
     weights = [SHADOW.a * 2.0**-q for q in range(5)]
     factor = [1.0, 1.5]
@@ -133,14 +143,10 @@ def test_same_bits_for_any_thread_count_and_order_of_trees():
     metamers, trees = make_stand(8, 12, 60)
     light = make_light(canopy=CANOPY)
     fields = []
-    threads = get_num_threads()
-    try:
-        for n in (1, threads):
-            set_num_threads(n)
+    for n in (1, 2):
+        with using_threads(n):
             light.expose(metamers, trees)
             fields.append(metamers.light.copy())
-    finally:
-        set_num_threads(threads)
     backwards = type(trees)(*(np.ascontiguousarray(column[::-1]) for column in trees))
     light.expose(metamers, backwards)
     fields.append(metamers.light.copy())
@@ -165,10 +171,8 @@ def test_lone_bud_has_full_light_and_no_direction():
     light = make_light()
     light.expose(metamers, trees)
     assert metamers.light[trees.start[0]] == 1.0
-    tip = trees.base_offset[0] + metamers.tip[trees.start[0]]
-    voxel = (trees.base_voxel[0] + np.floor(tip / np.float32(0.25)))[None].astype(np.int32)
-    found = light.directions(trees.species, voxel, np.array([[0, 0, 1]], np.float32))
-    assert np.array_equal(found, [[0, 0, 0]])
+    shoots, _ = every_bud(metamers, trees)
+    assert np.array_equal(light.directions(metamers, trees, shoots), [[0, 0, 0]])
 
 
 def test_two_buds_of_a_node_shade_one_another():
@@ -186,9 +190,8 @@ def test_without_near_field_light_is_that_of_the_far_field():
     living = np.array(sorted({k for k, _, _ in living_buds(metamers, trees, 0.25)}))
     assert np.all(metamers.light[living] > alone.floor_light() - 0.5)
     assert np.all(metamers.light[living] <= 1.0)
-    assert np.all(
-        alone.directions(trees.species, trees.base_voxel, np.eye(3, dtype=np.float32)) == 0
-    )
+    shoots, _ = every_bud(metamers, trees)
+    assert not alone.directions(metamers, trees, shoots).any()
 
 
 def test_no_trees_and_bare_trees():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import get_num_threads, set_num_threads
 
+from forest._threads import using_threads
 from forest.environment.light_grid import ShadowGrid, propagate
 from tests.reference.shadow import shadow_field
 
@@ -93,15 +93,11 @@ def test_same_bits_for_any_thread_count():
         (rng.integers(0, 9, 300), rng.integers(0, 40, 300), rng.integers(0, 9, 300))
     )
     fields = []
-    threads = get_num_threads()
-    try:
-        for n in (1, threads):
-            set_num_threads(n)
+    for n in (1, 2):
+        with using_threads(n):
             grid = make_grid(periodic=True)
             fill(grid, voxels, np.full(300, 16))
             fields.append(grid.shadow.copy())
-    finally:
-        set_num_threads(threads)
     assert np.array_equal(*fields)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from forest._threads import using_threads
 from forest.environment.marker_buds import apply_space, bud_index
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
 from forest.trees.metamers import LATERAL, NO_ROOM_LATERAL, NO_ROOM_TERMINAL, TERMINAL
@@ -143,16 +143,12 @@ def test_threads_do_not_change_bits() -> None:
     rng = np.random.default_rng(11)
     metamers, trees = stand(rng)
     species = make_species(rng, 2)
-    threads = numba.get_num_threads()
     answers = []
-    try:
-        for n in (1, min(2, threads)):
-            numba.set_num_threads(n)
+    for n in (1, 2):
+        with using_threads(n):
             space = MarkerSpace(1, SPACING, (8.0, 6.0), True, False)
             space.claim(metamers, trees, species)
             answers.append(space.claim(metamers, trees, species))
-    finally:
-        numba.set_num_threads(threads)
     assert answers[0].found.sum() > 100
     assert same(*answers)
 

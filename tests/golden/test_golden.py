@@ -9,17 +9,16 @@ from __future__ import annotations
 import hashlib
 import platform
 import tomllib
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 import pytest
 from llvmlite import binding
 
+from forest._threads import using_threads
 from forest.scenario import Scenario
 from forest.species.model import SECTIONS
 from forest.stand import Stand
@@ -122,17 +121,10 @@ def _scenario(model: str) -> Scenario:
 
 
 def _grow(model: str, threads: int) -> list[Row]:
-    numba.set_num_threads(threads)
     scenario = _scenario(model)
     stand = Stand(scenario)
-    return [Row.of(stand.step()) for _ in range(scenario.years)]
-
-
-@pytest.fixture(autouse=True)
-def _keep_threads() -> Iterator[None]:
-    before = numba.get_num_threads()
-    yield
-    numba.set_num_threads(before)
+    with using_threads(threads):
+        return [Row.of(stand.step()) for _ in range(scenario.years)]
 
 
 @pytest.mark.parametrize("model", MODELS)

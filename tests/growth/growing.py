@@ -15,8 +15,9 @@ from forest.growth.dealing import Workbench, deal
 from forest.growth.parameters import SpeciesTraits, Year, species_traits
 from forest.growth.pipes import thicken
 from forest.growth.shedding import shed
-from forest.growth.shoots import Shoots, extend, headings, shooting_buds
+from forest.growth.shoots import extend, shooting_buds
 from forest.species import Species, shipped_table
+from forest.trees.buds import Shoots
 from forest.trees.metamers import LATERAL, TERMINAL, Arena, Metamers
 from forest.trees.table import Trees
 
@@ -94,9 +95,9 @@ def grow_shoots(
     shared = deal(trees.size)
     shoots = shooting_buds(arena.metamers, trees, shared, traits)
     arena.make_room(trees.start, trees.size, trees.room, trees.size + shoots.new)
-    heading = np.empty((len(shoots.metamer), 3), np.float32)
-    headings(arena.metamers, trees, shared, shoots, heading)
-    toward = _pull(arena.metamers, trees, shoots) if pull else np.zeros_like(heading)
+    toward = _pull(arena.metamers, trees, shoots)
+    if not pull:
+        toward[:] = 0.0
     extend(arena.metamers, trees, shared, shoots, toward, traits, year, solid, VOXEL_M)
     return shoots
 

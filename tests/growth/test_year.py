@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from forest._threads import using_threads
 from forest.growth.budget import EXTENSION, INCOME, LEAVES, RESERVE_CHANGE, RING, UPKEEP
 from forest.trees.metamers import Arena, Metamers
 from forest.trees.table import Trees
@@ -101,17 +101,13 @@ def test_the_contract_holds(mode: str, seed: int) -> None:
 
 @pytest.mark.parametrize("mode", list(MODES))
 def test_threads_do_not_matter(mode: str) -> None:
-    threads = numba.get_num_threads()
     results = []
-    try:
-        for number in (1, 2):
-            numba.set_num_threads(number)
+    for number in (1, 2):
+        with using_threads(number):
             m, trees = _stand(11)
             arena = arena_of(m, trees)
             accounts = _grow(arena, trees, mode, 4)
             results.append(_taken(arena, trees) + accounts)
-    finally:
-        numba.set_num_threads(threads)
     for one, two in zip(*results, strict=True):
         np.testing.assert_array_equal(one, two)
 
