@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import forest
-from analysis.hart_baker import KINDS, SEEDS, Grown, figure_1, load, off_centre
+from analysis.hart_baker import KINDS, SEEDS, Grown, figure_1, load, measure, off_centre
+from tests.reference import balance as slow
+from tests.reference.plant import read_plant
 
 PRUNED = """
 years = 20
@@ -56,6 +58,47 @@ def test_a_phototropic_tree_needs_few_limbs(trees: dict[str, list[Grown]]) -> No
         for pho, gen in zip(trees["phototropic"], trees["genetic"], strict=True)
     ]
     assert np.sum(alone, axis=0).min() >= 0.75 * len(SEEDS)
+
+
+def test_limbs_in_the_shade_die() -> None:
+    """Section 4.1: under this model, too, in paper mode."""
+    with_death, without = (
+        forest.Stand(
+            load("phototropic").with_overrides(
+                [f"species.generic_deciduous.shedding.light_per_internode={threshold}"]
+            )
+        )
+        for threshold in (0.45, 0.0)
+    )
+    for _ in range(12):
+        with_death.step()
+        without.step()
+    assert measure(with_death).limbs < 0.7 * measure(without).limbs
+
+
+@pytest.mark.parametrize("mode", ["paper", "mass_balance"])
+def test_limbs_support_what_they_carry_as_the_tree_grows(mode: str) -> None:
+    """Every limb, every year (eqs 6, 10, 18)."""
+    scenario = load("balanced").with_overrides([f"mode={mode}"])
+    wood = scenario.species_list[0].wood
+    exponent = wood.pipe_exponent if mode == "paper" else 2.0
+    traits = slow.Traits(
+        density=wood.density_kg_m3,
+        exponent=exponent,
+        twig=wood.twig_diameter_m / 2,
+        cones=mode == "paper",
+        unit=(0.2,),
+    )
+    stand = forest.Stand(scenario)
+    loads = []
+    for _ in range(scenario.years):
+        stand.step()
+        nodes = read_plant(stand.arena.metamers, stand.rows, 0)
+        trunk = slow.limb_of(nodes[0], traits, lambda _: np.zeros(3), lambda _: False)
+        for limb in trunk.above():
+            loads.append(limb.supported / traits.supports(limb.base))
+    assert max(loads) < 1.0 + 1e-4
+    assert (max(loads) > 0.9) == (mode == "paper")  # wood is all that growth costs there
 
 
 def _prune_one_side(stand: forest.Stand) -> None:
