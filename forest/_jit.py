@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import config
+from llvmlite import ir
+from numba.core import cgutils, config, types
 from numba.core.event import Event, Listener, install_listener
+from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -106,3 +108,16 @@ def driver(function: F) -> F:
     to half of a kernel's time. A driver must not make arrays itself; what it calls may.
     """
     return numba.njit(**_OPTIONS, _nrt=False)(function)  # type: ignore[no-any-return]
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def move_bytes(typing_context: Any, to: Any, source: Any, count: Any) -> Any:
+    """Copy `count` bytes from one address to another, which may overlap (C's memmove)."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        byte = ir.IntType(8).as_pointer()
+        target, origin = (builder.inttoptr(address, byte) for address in arguments[:2])
+        cgutils.raw_memmove(builder, target, origin, arguments[2], 1)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), emit

@@ -7,12 +7,9 @@ t on. Nothing that is computed depends on T.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import TypeVar
-
-T = TypeVar("T")
 
 
 class _Threads:
@@ -71,16 +68,6 @@ def using_threads(count: int) -> Iterator[None]:
         yield
     finally:
         _threads.count = before
-
-
-def share_out(function: Callable[[T], object], items: Sequence[T]) -> None:
-    """Call `function` with each item, the items dealt to the threads."""
-
-    def take_every(first: int, step: int) -> None:
-        for item in items[first::step]:
-            function(item)
-
-    _threads.run(take_every, ())
 
 
 def in_threads(kernel: Callable[..., object], *args: object) -> None:

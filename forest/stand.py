@@ -67,7 +67,7 @@ class Stand:
         self._paper = scenario.mode == "paper"
         self._traits = species_traits(self.species, paper=self._paper)
         self._measures_of = _measure_species(self)
-        self._surroundings = Surroundings(scenario)
+        self._surroundings = Surroundings(scenario, self.pipe_exponent)
         self.arena = Arena()
         self.rows = table.empty()
         self._bench = Workbench()
@@ -101,7 +101,7 @@ class Stand:
         return record
 
     def _expose(self) -> None:
-        self._surroundings.expose(self.arena.metamers, self.rows)
+        self._surroundings.expose(self.arena.metamers, self.rows, self._step)
         self._lap("expose")
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:

@@ -30,6 +30,11 @@ _VARIANTS = {
     "paper, priority": ["mode=paper", "growth.bud_fate=priority", "environment={shadow={}}"],
     "paper, balance": ["mode=paper", "growth.bud_fate=balance", "environment={shadow={}}"],
     "paper, markers": ["mode=paper", "environment={markers={}}"],
+    "rendered light, open": [
+        "plot.boundary=open",
+        "environment={rendered={response='flat_above_20'}}",
+        'obstacles=[{ kind = "box", min_m = [0, 0, 0], max_m = [1, 1, 2] }]',
+    ],
     "light and markers": ["environment={shadow={}, canopy={}, markers={}}"],
 }
 

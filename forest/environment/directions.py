@@ -84,31 +84,29 @@ def _own_layer(way: Any, n: Any) -> Any:
 
 
 @njit
+def _shadow_at(shadow: Any, window: Any, x: Any, y: Any, z: Any) -> Any:
+    z, y, x = place_in(window, x, y, z)
+    return np.int64(shadow[z, y, x]) if z >= 0 else np.int64(0)
+
+
+@njit
 def _against_gradient(field: Any, bud: Any, out: Any) -> None:
     """Set a unit vector against the gradient of the shadow; zero where it is flat."""
     shadow = field.shadow
-    weights = field.weights
     window = window_of(field)
-    squares = 0.0
-    for axis in range(3):
-        slope = np.int64(0)
-        for side in (-1, 1):
-            way = (
-                side if axis == 0 else 0,
-                side if axis == 1 else 0,
-                side if axis == 2 else 0,
-            )
-            z, y, x = place_in(window, bud.x + way[0], bud.y + way[1], bud.z + way[2])
-            found = np.int64(shadow[z, y, x]) if z >= 0 else np.int64(0)
-            layer = _own_layer(way, len(weights))
-            if layer >= 0:
-                found -= np.int64(weights[layer]) * bud.own
-            slope -= side * found
-        out[axis] = slope
-        squares += np.float64(slope) ** 2
-    if squares > 0.0:
-        for axis in range(3):
-            out[axis] /= np.sqrt(squares)
+    x = _shadow_at(shadow, window, bud.x - 1, bud.y, bud.z)
+    x -= _shadow_at(shadow, window, bud.x + 1, bud.y, bud.z)
+    y = _shadow_at(shadow, window, bud.x, bud.y - 1, bud.z)
+    y -= _shadow_at(shadow, window, bud.x, bud.y + 1, bud.z)
+    z = _shadow_at(shadow, window, bud.x, bud.y, bud.z - 1)
+    z -= _shadow_at(shadow, window, bud.x, bud.y, bud.z + 1)
+    if len(field.weights) > 1:  # of the six, only the voxel below lies in the bud's own pyramid
+        z -= np.int64(field.weights[1]) * bud.own
+    squares = np.float64(x) ** 2 + np.float64(y) ** 2 + np.float64(z) ** 2
+    length = np.sqrt(squares) if squares > 0.0 else 1.0
+    out[0] = np.float32(x) / length
+    out[1] = np.float32(y) / length
+    out[2] = np.float32(z) / length
 
 
 @njit

@@ -1,7 +1,9 @@
 """What a stand's buds know of light and space: the environments that a scenario names.
 
 Light fills `metamers.light` (Q); marker space marks the buds that have no room (their Q is 0).
-Where both are given a bud needs light and room, and grows towards its markers.
+Where both are given a bud needs light and room, and grows towards its markers. Rendered light takes
+the place of the grids' light. A picture has no gradient, so buds then have no direction of most
+light, unless markers give one.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowS
 from forest.environment.marker_buds import BudSpace, apply_space
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
 from forest.environment.obstacles import Box, Mesh, Solid
+from forest.environment.rendered_kernels import Looks
+from forest.environment.rendered_light import RenderedLight, RenderedSpec
 from forest.trees.buds import Shoots
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
@@ -27,6 +31,12 @@ if TYPE_CHECKING:
 class Surroundings:
     """The environments of one stand.
 
+    Parameters
+    ----------
+    scenario : Scenario
+    pipe_exponent : float64 (species,)
+        Pipe exponent n of each species, as used in this run.
+
     Attributes
     ----------
     voxel_m : float
@@ -35,7 +45,7 @@ class Surroundings:
         Light Q of an unshaded bud.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, pipe_exponent: NDArray[np.float64]) -> None:
         spec = scenario.environment
         species = scenario.species_list
         periodic = scenario.plot.boundary == "periodic"
@@ -48,7 +58,6 @@ class Surroundings:
         elif spec.canopy is not None:
             self.voxel_m = spec.canopy.voxel_m
         else:
-            assert spec.markers is not None
             self.voxel_m = min(size_m) / max(1, round(min(size_m) / float(internode.min())))
         self.full_light = spec.shadow.full_light if spec.shadow else 1.0
         self._light = Light(
@@ -69,6 +78,19 @@ class Surroundings:
                 for o in scenario.obstacles
             ],
         )
+        self._rendered: RenderedLight | None = None
+        if spec.rendered is not None:
+            self._rendered = RenderedLight(
+                RenderedSpec(**spec.rendered.model_dump()),
+                size_m=size_m,
+                periodic=periodic,
+                latitude_deg=scenario.site.latitude_deg,
+                seed=scenario.seed,
+                looks=Looks(np.array([s.leaves.area_m2 for s in species]), pipe_exponent),
+                solid=self._light.solid,
+                voxel_m=self.voxel_m,
+                full_light=self.full_light,
+            )
         self._markers: MarkerSpace | None = None
         if spec.markers is not None:
             self._markers = MarkerSpace(
@@ -93,9 +115,12 @@ class Surroundings:
         """The voxels that obstacles fill."""
         return self._light.solid
 
-    def expose(self, metamers: Metamers, trees: Trees) -> None:
-        """Tell every bud how much light and room it has."""
-        self._light.expose(metamers, trees)
+    def expose(self, metamers: Metamers, trees: Trees, step: int) -> None:
+        """Tell every bud how much light and room it has in the given step."""
+        if self._rendered is not None:
+            self._rendered.expose(metamers, trees, step)
+        else:
+            self._light.expose(metamers, trees)
         if self._markers is not None:
             space = self._markers.claim(metamers, trees, self._marker_species)
             apply_space(metamers, trees, space)

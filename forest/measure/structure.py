@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from forest._jit import njit
+from forest._threads import thread_count
 
 #: Edge of the raster on which crowns are laid, m.
 COVER_CELL_M = 0.5
@@ -90,7 +91,7 @@ class Neighbours:
         if k < 1:
             return
         tree = _tree_of_places(np.column_stack((x, y)), size_m, periodic)
-        distance, index = tree.query(tree.data, k + 1)
+        distance, index = tree.query(tree.data, k + 1, workers=thread_count())
         # A tree is its own nearest neighbour, except that one on the same spot may come before
         # it, or push it off the list: drop itself, or else the farthest.
         own = index == np.arange(n)[:, None]

@@ -105,6 +105,42 @@ class Canopy(Table):
     diffuse_share: float = quantity(0.5, "share of diffuse light above the canopy", ge=0, le=1)
 
 
+class Rendered(Table):
+    """Light as in pictures taken from the sun or the sky (Hart and Baker 2003, 4.1)."""
+
+    pixel_m: float = quantity(
+        0.05, "edge of a picture's pixel on the ground", unit="m", ge=0.005, le=5
+    )
+    directions: int = quantity(1, "pictures a year, each from its own direction", ge=1, le=256)
+    sun_share: float = quantity(
+        0.8, "probability that a picture is taken from the sun, else from the sky", ge=0, le=1
+    )
+    lowest_deg: float = quantity(
+        10.0, "least height of sun and sky above the horizon", unit="degree", ge=1, le=30
+    )
+    response: Literal["linear", "flat_above_20"] = quantity(
+        "linear", "flat_above_20: a fifth of full light is as good as all of it", unit=""
+    )
+    clearing_radius_m: float | None = quantity(
+        None,
+        "light comes only through a clearing of this radius around the plot's centre; "
+        "default: from everywhere",
+        unit="m",
+        gt=0,
+        le=1e5,
+    )
+    clearing_height_m: float | None = quantity(
+        None, "height of the wall around the clearing", unit="m", gt=0, le=1000
+    )
+
+    @model_validator(mode="after")
+    def _clearing_is_whole(self) -> Rendered:
+        if (self.clearing_radius_m is None) != (self.clearing_height_m is None):
+            key = "clearing_radius_m" if self.clearing_radius_m is None else "clearing_height_m"
+            raise Refusal("not given", key=key, expected="radius and height of a clearing, or none")
+        return self
+
+
 class Envelope(Table):
     """A volume to which markers are confined."""
 
@@ -152,16 +188,24 @@ class Markers(Table):
 
 
 class Environment(Table):
-    """How buds learn of light and space; at least one of the three tables."""
+    """How buds learn of light and space; at least one of the tables."""
 
     shadow: Shadow | None = None
     canopy: Canopy | None = None
     markers: Markers | None = None
+    rendered: Rendered | None = None
 
     @model_validator(mode="after")
     def _some_fit_together(self) -> Environment:
-        if self.shadow is None and self.canopy is None and self.markers is None:
-            raise Refusal("empty", expected="a table shadow, canopy or markers")
+        if all(part is None for _, part in self):
+            raise Refusal("empty", expected="a table shadow, canopy, markers or rendered")
+        if self.rendered is not None and (self.shadow is not None or self.canopy is not None):
+            other = "shadow" if self.shadow is not None else "canopy"
+            raise Refusal(
+                f"a leaf would be shaded twice, by rendered and by {other}",
+                key="rendered",
+                expected="rendered alone or with markers",
+            )
         if self.shadow is not None and self.canopy is not None:
             ratio = self.canopy.voxel_m / self.shadow.voxel_m
             if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:

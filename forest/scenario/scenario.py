@@ -37,6 +37,8 @@ from forest.species.text import input_error, parse_toml, read_text, to_toml
 
 #: A periodic grid of more columns of voxels than this fits no memory.
 _MOST_COLUMNS = 250_000_000
+#: Pixels that a picture of the plot may have: its table of tiles then stays small.
+_MOST_PIXELS = 4e9
 
 
 class Scenario(Table):
@@ -154,6 +156,27 @@ class Scenario(Table):
             kept = markers.model_copy(update={"release": False})
             environment = self.environment.model_copy(update={"markers": kept})
             self.__dict__["environment"] = environment
+        return self
+
+    @model_validator(mode="after")
+    def _picture_fits(self) -> Scenario:
+        rendered = self.environment.rendered
+        if rendered is None:
+            return self
+        if rendered.clearing_radius_m is not None and self.plot.boundary == "periodic":
+            raise Refusal(
+                "a periodic plot has no clearing",
+                key="environment.rendered.clearing_radius_m",
+                expected='plot.boundary = "open"',
+            )
+        size_x, size_y = self.plot.size_m
+        least = (size_x * size_y / _MOST_PIXELS) ** 0.5
+        if rendered.pixel_m < least:
+            raise Refusal(
+                f"{rendered.pixel_m:g} is too fine for a plot of {size_x:g} x {size_y:g} m",
+                key="environment.rendered.pixel_m",
+                expected=f"at least {least:.3g}",
+            )
         return self
 
     @model_validator(mode="after")

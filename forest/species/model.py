@@ -246,6 +246,86 @@ class Balance(Table):
     )
 
 
+class Mechanics(Table):
+    """How stiff, strong and heavy the wood is, and how it rights leaning axes."""
+
+    modulus_juvenile_gpa: float = quantity(
+        6.0, "Young's modulus of new wood (E_juv, Taylor-Hell 2005, 6.1)", unit="GPa", gt=0, le=50
+    )
+    modulus_mature_gpa: float = quantity(
+        10.0, "Young's modulus that old wood approaches (E_mature)", unit="GPa", gt=0, le=50
+    )
+    maturing_years: float = quantity(
+        10.0,
+        "years of maturing: wood goes 1/years of the rest of its way a year",
+        unit="year",
+        ge=1,
+        le=500,
+    )
+    modulus_reaction_gpa: float = quantity(
+        11.0, "Young's modulus of reaction wood (E_rw, eq. 18)", unit="GPa", gt=0, le=50
+    )
+    shear_ratio: float = quantity(
+        0.06, "shear modulus per Young's modulus along the grain (G/E)", gt=0, le=0.5
+    )
+    rupture_mpa: float = quantity(
+        60.0, "bending stress at which green wood breaks", unit="MPa", gt=0, le=300
+    )
+    green_density_kg_m3: float = quantity(
+        950.0, "fresh mass, water included, per fresh volume of wood", unit="kg/m3", ge=100, le=1500
+    )
+    leaf_water_factor: float = quantity(2.5, "fresh mass per dry mass of leaves", ge=1, le=20)
+    fruit_mass_kg: float = quantity(
+        0.0, "fresh mass of the fruit at a living site in summer", unit="kg", ge=0, le=10
+    )
+    tropic_force_n: float = quantity(
+        0.0,
+        "force that turns a new metamer upwards (F_tropic, eq. 4); 0 = off",
+        unit="N",
+        ge=0,
+        le=100,
+    )
+    stem_angle_deg: float = quantity(
+        0.0, "angle to the vertical that a stem seeks", unit="degree", ge=0, le=180
+    )
+    branch_angle_deg: float = quantity(
+        60.0, "angle to the vertical that a branch seeks", unit="degree", ge=0, le=180
+    )
+    righting_from_deg: float = quantity(
+        2.0,
+        "departure from that angle from which an axis rights itself",
+        unit="degree",
+        ge=0,
+        le=90,
+    )
+    righting_span_deg: float = quantity(
+        10.0, "departure beyond it at which reaction is full", unit="degree", gt=0, le=180
+    )
+    ring_strain: float = quantity(
+        0.0015,
+        "mean maturation strain of a full reaction ring: contraction of tension wood, expansion of "
+        "compression wood (e0)",
+        ge=0,
+        le=0.05,
+    )
+    ring_strain_difference: float = quantity(
+        0.002, "maturation strain of reaction wood beyond the opposite side's (D)", ge=0, le=0.05
+    )
+    ring_swell: float = quantity(
+        1.5, "width of a reaction ring along the bending direction per width across it", ge=1, le=2
+    )
+    deviation_limit_rad_m: float = quantity(
+        0.05,
+        "departure from the rest curvature beyond which beta righting sets in (xi)",
+        unit="rad/m",
+        ge=0,
+        le=1000,
+    )
+    rest_share: float = quantity(
+        0.5, "share of the rest curvature in a reaction ring's (beta, eq. 19)", ge=0, le=1
+    )
+
+
 class Mensuration(Table):
     """How foresters measure the species."""
 
@@ -265,6 +345,7 @@ SECTIONS: dict[str, type[Table]] = {
     "leaves": Leaves,
     "carbon": Carbon,
     "balance": Balance,
+    "mechanics": Mechanics,
     "mensuration": Mensuration,
 }
 
@@ -286,6 +367,7 @@ class Species(Table):
     leaves: Leaves = Leaves()
     carbon: Carbon = Carbon()
     balance: Balance = Balance()
+    mechanics: Mechanics = Mechanics()
     mensuration: Mensuration = Mensuration()
     sources: dict[str, dict[str, str]] = Field(
         default={},

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._threads import share_out
+from forest._jit import driver, move_bytes
+from forest._threads import in_threads
 
 # Bits of Metamers.state
 MAIN = np.uint8(1)  # continues its parent's axis (else it starts an axis of its own)
@@ -74,6 +75,18 @@ def allocate(capacity: int) -> Metamers:
     return Metamers(**arrays)
 
 
+@driver
+def _move_fields(first, step, address, width, source, to, size):  # type: ignore[no-untyped-def]
+    """Move extents in every field; fields are told by their address and bytes per metamer."""
+    for field in range(first, len(address), step):
+        for k in range(len(source)):
+            move_bytes(
+                address[field] + to[k] * width[field],
+                address[field] + source[k] * width[field],
+                np.int64(size[k]) * width[field],
+            )
+
+
 class Arena:
     """The metamers of all trees and the room between them.
 
@@ -129,13 +142,9 @@ class Arena:
         self, source: NDArray[np.int64], to: NDArray[np.int64], size: NDArray[np.int32]
     ) -> None:
         """Move extents one after the other; each field by one thread."""
-        moves = list(zip(source.tolist(), to.tolist(), size.tolist(), strict=True))
-
-        def move(field: NDArray[Any]) -> None:
-            for start, end, n in moves:
-                field[end : end + n] = field[start : start + n]
-
-        share_out(move, self.metamers)
+        address = np.array([field.ctypes.data for field in self.metamers], np.int64)
+        width = np.array([field.nbytes // self.capacity for field in self.metamers], np.int64)
+        in_threads(_move_fields, address, width, source, to, size)
 
     def _repack(
         self,

@@ -85,7 +85,7 @@ def test_the_text_is_right_before_it_is_spoilt(tmp_path: Path) -> None:
         (
             "[environment.shadow]\n[environment.canopy]",
             "[environment]",
-            ["shadow, canopy or markers"],
+            ["shadow, canopy, markers or rendered"],
         ),
         ("[environment.shadow]", "[environment.shadw]", ["did you mean 'shadow'?"]),
         ("[environment.shadow]", "[environment.shadow]\nb = 1", ["shadow.b: 1", "above 1"]),

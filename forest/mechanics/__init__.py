@@ -1,0 +1,1 @@
+"""What holds trees up: rods, their wood, loads and stability."""
