@@ -15,7 +15,7 @@ from forest.growth.balance import (
     survey,
     trunk_growth,
 )
-from forest.growth.limbs import Limbs, Tree, Wood, cone_centre, cone_volume, supports
+from forest.growth.limbs import SUPPORT, Limbs, Tree, Wood, cone_centre, cone_volume, supports
 from forest.trees.metamers import LATERAL, NO_ROOM_LATERAL, NO_ROOM_TERMINAL, TERMINAL
 from tests.builders import random_arena
 from tests.growth.growing import extent
@@ -94,7 +94,7 @@ def test_cone(base: float, part: float) -> None:
 
 def test_height_limit() -> None:
     """A cone of 300 feet carries itself exactly (eq. 8)."""
-    wood = Wood(500.0, np.pi * 30.48, 2.0, 0.0, True)
+    wood = Wood(500.0, SUPPORT, 2.0, 0.0, True)
     assert supports(0.5, wood) == pytest.approx(500.0 * cone_volume(91.44, 0.5, 0.0))
 
 
