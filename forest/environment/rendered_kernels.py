@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import inline, njit
+from forest._jit import driver, njit
 from forest.environment.rendered_shapes import (
     column_spots,
     leaf_spots,
@@ -136,7 +136,7 @@ def bound_leaves(first, step, metamers, trees, walk, looks, scene, bounds):  # t
         bounds[hand, 3] = j1
 
 
-@inline
+@njit
 def _leaf(scene: Any, x: Any, y: Any, tip: Any, k: Any, area: Any) -> Any:
     """Find a leaf's spots, how many pixels it covers, and its height."""
     z = np.float64(tip[k, 2])
@@ -144,7 +144,7 @@ def _leaf(scene: Any, x: Any, y: Any, tip: Any, k: Any, area: Any) -> Any:
     return spots, covers, z
 
 
-@inline
+@njit
 def _tiles_along(low: Any, high: Any, n: Any, periodic: Any) -> Any:
     """Find the first tile along an axis that some pixels touch, and how many."""
     tiles = (n + TILE - 1) >> SHIFT
@@ -161,7 +161,7 @@ def _tiles_along(low: Any, high: Any, n: Any, periodic: Any) -> Any:
     return begin >> SHIFT, min(((end - n) >> SHIFT) - (begin >> SHIFT) + 1 + tiles, tiles)
 
 
-@inline
+@njit
 def _only_tile(spots: Any, wide: Any, deep: Any, periodic: Any) -> Any:
     """Find the one tile that holds all spots, else NONE or SEVERAL (as far as is easily told)."""
     i, j = spots[0], spots[2]
@@ -178,7 +178,7 @@ def _only_tile(spots: Any, wide: Any, deep: Any, periodic: Any) -> Any:
     return (j >> SHIFT) * ((wide + TILE - 1) >> SHIFT) + (i >> SHIFT)
 
 
-@inline
+@njit
 def _enter(
     spots: Any, scene: Any, cursor: Any, hand: Any, owner: Any, item: Any, tree: Any, name: Any
 ) -> None:
@@ -241,7 +241,7 @@ def enter(first, step, metamers, trees, walk, looks, scene, radius, columns, ent
             _enter(spots, scene, cursor, HANDS, owner, item, np.int64(-1), np.int64(c))
 
 
-@inline
+@njit
 def _turns(spots: Any, tile: Any, scene: Any) -> Any:
     """Find how many turns of the torus bring spots into a tile: least and most along x, along y."""
     low_i = high_i = low_j = high_j = np.int64(0)
@@ -255,7 +255,7 @@ def _turns(spots: Any, tile: Any, scene: Any) -> Any:
     return low_i, high_i, low_j, high_j
 
 
-@inline
+@njit
 def _part(spots: Any, tile: Any, over_i: Any, over_j: Any) -> Any:
     """Cut spots to those that lie in a tile after some turns; give the tile's corner there, too."""
     i0, j0 = tile[0] + over_i, tile[2] + over_j
@@ -332,9 +332,8 @@ def _count_seen(depth, who, tile, span, metamers, trees, scene, entries):  # typ
         seen[e] = 1 if depth[j - tile[2], i - tile[0]] <= np.float32(z) else 0
 
 
-@driver
-def draw(first, step, metamers, trees, looks, scene, radius, columns, entries):  # type: ignore[no-untyped-def]
-    """Draw every tile and count the pixels of every entry."""
+@njit
+def _draw_tiles(first, step, metamers, trees, looks, scene, radius, columns, entries):  # type: ignore[no-untyped-def]
     depth = np.empty((TILE, TILE), np.float32)
     who = np.empty((TILE, TILE), np.int32)
     tiles_x = (scene.wide + TILE - 1) >> SHIFT
@@ -352,7 +351,13 @@ def draw(first, step, metamers, trees, looks, scene, radius, columns, entries): 
         _count_seen(depth, who, place, span, metamers, trees, scene, entries)
 
 
-@inline
+@driver
+def draw(first, step, metamers, trees, looks, scene, radius, columns, entries):  # type: ignore[no-untyped-def]
+    """Draw every tile and count the pixels of every entry."""
+    _draw_tiles(first, step, metamers, trees, looks, scene, radius, columns, entries)
+
+
+@njit
 def _is_open(scene: Any, clearing: Any, x: Any, y: Any, z: Any) -> Any:
     """Tell whether the light comes over the wall of a clearing to a point.
 

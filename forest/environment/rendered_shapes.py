@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import inline
+from forest._jit import njit
 
 
 class Scene(NamedTuple):
@@ -66,13 +66,13 @@ class Columns(NamedTuple):
     edge: float
 
 
-@inline
+@njit
 def _between(low: Any, high: Any, per: Any, shift: Any) -> Any:
     """Find the pixels whose centres lie in [low, high)."""
     return np.int64(np.ceil(low * per - shift)), np.int64(np.ceil(high * per - shift)) - 1
 
 
-@inline
+@njit
 def leaf_spots(scene: Any, x: Any, y: Any, z: Any, half: Any) -> Any:
     """Find the spots of a horizontal square leaf of half the edge, and how many pixels it covers.
 
@@ -92,7 +92,7 @@ def leaf_spots(scene: Any, x: Any, y: Any, z: Any, half: Any) -> Any:
     return (i0, i0, j0, j0), np.int64(0)
 
 
-@inline
+@njit
 def limb_ends(scene: Any, x: Any, y: Any, tip: Any, parent: Any, k: Any) -> Any:
     """Carry both ends of an internode to the ground: (u, v, z) of its base and of its tip."""
     x0, y0, z0 = x, y, 0.0
@@ -107,7 +107,7 @@ def limb_ends(scene: Any, x: Any, y: Any, tip: Any, parent: Any, k: Any) -> Any:
     return u0, v0, z0, x1 - z1 * scene.slope_x, y1 - z1 * scene.slope_y, z1
 
 
-@inline
+@njit
 def limb_spots(scene: Any, ends: Any, radius: Any) -> Any:
     """Bound the pixels of an internode, a capsule around the line between its ends."""
     u0, v0, _, u1, v1, _ = ends
@@ -118,7 +118,7 @@ def limb_spots(scene: Any, ends: Any, radius: Any) -> Any:
     return i0, i1, j0, j1
 
 
-@inline
+@njit
 def column_spots(scene: Any, columns: Any, c: Any) -> Any:
     """Bound the pixels of a column."""
     u0, u1 = columns.foot[c] * scene.slope_x, columns.top[c] * scene.slope_x
@@ -134,7 +134,7 @@ def column_spots(scene: Any, columns: Any, c: Any) -> Any:
 # from a spot to give its place in the tile. What is at equal height stays as it was drawn first.
 
 
-@inline
+@njit
 def paint_leaf(depth: Any, who: Any, name: Any, part: Any, corner: Any, z: Any) -> None:
     """Draw a leaf into a tile."""
     near = np.float32(z)
@@ -145,7 +145,7 @@ def paint_leaf(depth: Any, who: Any, name: Any, part: Any, corner: Any, z: Any) 
                 who[j, i] = name
 
 
-@inline
+@njit
 def _strip(ends: Any, along_d: Any, square: Any, radius: Any, scene: Any) -> Any:
     """Describe where an internode's line crosses rows of pixels.
 
@@ -164,7 +164,7 @@ def _strip(ends: Any, along_d: Any, square: Any, radius: Any, scene: Any) -> Any
     return at, step, radius * scene.per_x * np.sqrt(square / width) + 1e-6
 
 
-@inline
+@njit
 def paint_limb(
     depth: Any,
     who: Any,
@@ -213,7 +213,7 @@ def paint_limb(
                 who[j - corner[1], i - corner[0]] = name
 
 
-@inline
+@njit
 def _stay(at: Any, slope: Any, low: Any, edge: Any, foot: Any, top: Any) -> Any:
     """Find the heights at which a ray from `at` on the ground is between low and low + edge."""
     if abs(slope) < 1e-12:
@@ -225,7 +225,7 @@ def _stay(at: Any, slope: Any, low: Any, edge: Any, foot: Any, top: Any) -> Any:
     return max(min(a, b), foot), min(max(a, b), top)
 
 
-@inline
+@njit
 def paint_column(
     depth: Any,
     who: Any,

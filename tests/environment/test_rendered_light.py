@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from forest._threads import set_threads, threads
+from forest._threads import using_threads
 from forest.environment.obstacles import Box, solid_voxels, voxelise
 from forest.environment.rendered_kernels import TILE, Looks
 from forest.environment.rendered_light import RenderedLight, RenderedSpec
@@ -242,14 +242,10 @@ def test_same_bits_for_any_thread_count():
     assert SIZE[0] / 0.02 > TILE  # several tiles
     metamers, trees = random_arena(np.random.default_rng(8), 12, 60, size_m=SIZE)
     fields = []
-    count = threads()
-    try:
-        for n in (1, 2, 3):
-            set_threads(n)
+    for n in (1, 2, 3):
+        with using_threads(n):
             make_light(pixel_m=0.02, directions=2).expose(metamers, trees, 1)
-            fields.append(metamers.light.copy())
-    finally:
-        set_threads(count)
+        fields.append(metamers.light.copy())
     assert fields[0][trees.start[0] : trees.start[-1]].mean() > 0.1
     assert np.array_equal(fields[0], fields[1])
     assert np.array_equal(fields[0], fields[2])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from forest._threads import set_threads, threads
+from forest._threads import using_threads
 from forest.mechanics.branch_points import reaction_rings, support_offset, widening
 from forest.trees.metamers import MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
@@ -130,11 +130,7 @@ def test_reaction_turns_with_the_world(seed: int, angle: float) -> None:
 
 def test_threads_give_the_same_rings() -> None:
     m, trees = woody_arena(np.random.default_rng(7), 40, 40)
-    before = threads()
-    try:
-        set_threads(1)
+    with using_threads(1):
         one = reaction_rings(m, trees, SPECIES)
-        set_threads(3)
+    with using_threads(3):
         np.testing.assert_array_equal(one, reaction_rings(m, trees, SPECIES))
-    finally:
-        set_threads(before)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from forest._threads import set_threads, threads
+from forest._threads import using_threads
 from forest.mechanics.stability import Stability, stability
 from forest.mechanics.stems import read_stem
 from forest.mechanics.stress import Wind
@@ -115,14 +115,10 @@ def _same(one: Stability, other: Stability) -> None:
 def test_threads_give_the_same_bits() -> None:
     m, trees = woody_arena(np.random.default_rng(5), 40, 40)
     wind = Wind(np.full(40, 15.0), 4.0, 0.3)
-    before = threads()
-    try:
-        set_threads(1)
+    with using_threads(1):
         one = stability(m, trees, SPECIES, wind)
-        set_threads(3)
+    with using_threads(3):
         _same(one, stability(m, trees, SPECIES, wind))
-    finally:
-        set_threads(before)
 
 
 def test_tree_without_metamers_has_no_stem() -> None:

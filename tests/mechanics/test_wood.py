@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from forest._threads import set_threads, threads
+from forest._threads import using_threads
 from forest.growth.dealing import deal
 from forest.mechanics.righting import BETA, NONE, STRAIN
 from forest.mechanics.rods import Rods, allocate_rods
@@ -235,19 +235,15 @@ def test_first_wood_keeps_its_shape_and_no_growth_is_no_ring() -> None:
 @pytest.mark.parametrize("way", WAYS.values())
 def test_threads_do_not_change_bits(way: np.int64) -> None:
     results = []
-    usual = threads()
-    try:
-        for count in (1, 2, 3):
-            set_threads(count)
-            rng = np.random.default_rng(4)
-            m, trees = random_arena(rng, 20, 30)
-            rods = _random_rods(rng, len(m.parent))
-            m.pipe[:] = (2.1 * rods.ringed + 1e-3) ** 2
-            ring = np.zeros((len(m.parent), 2), np.float32)
+    for count in (1, 2, 3):
+        rng = np.random.default_rng(4)
+        m, trees = random_arena(rng, 20, 30)
+        rods = _random_rods(rng, len(m.parent))
+        m.pipe[:] = (2.1 * rods.ringed + 1e-3) ** 2
+        ring = np.zeros((len(m.parent), 2), np.float32)
+        with using_threads(count):
             lay_wood(m, trees, deal(trees.size), rods, traits_of(), way, ring)
-            results.append((ring, *rods))
-    finally:
-        set_threads(usual)
+        results.append((ring, *rods))
     for other in results[1:]:
         for a, b in zip(results[0], other, strict=True):
             np.testing.assert_array_equal(a, b)
