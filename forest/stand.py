@@ -115,7 +115,7 @@ class Stand:
             accounts,
             self._paper or None,
             self.scenario.growth.bud_fate == "priority" or None,
-            self.scenario.growth.balance or None,
+            self.scenario.growth.bud_fate == "balance" or None,
         )
         self._lap("allocate")
 
@@ -199,6 +199,7 @@ class Stand:
             income_factor=factor * s.site.productivity,
             full_light=self._full_light,
             paper=self._paper,
+            balance=s.growth.bud_fate == "balance",
         )
 
     def _lap(self, phase: str) -> None:

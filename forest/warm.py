@@ -23,11 +23,12 @@ _VARIANTS = {
     "light, costs": [],
     "light, costs, obstacle, open": [
         "plot.boundary=open",
-        "growth.balance=true",
+        "growth.bud_fate=balance",
         "environment.shadow.direction=least_shadow",
         'obstacles=[{ kind = "box", min_m = [0, 0, 0], max_m = [1, 1, 2] }]',
     ],
     "paper, priority": ["mode=paper", "growth.bud_fate=priority", "environment={shadow={}}"],
+    "paper, balance": ["mode=paper", "growth.bud_fate=balance", "environment={shadow={}}"],
     "paper, markers": ["mode=paper", "environment={markers={}}"],
     "rendered light, open": [
         "plot.boundary=open",

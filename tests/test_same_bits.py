@@ -32,7 +32,7 @@ ENVIRONMENTS = {
 }
 MATRIX = list(
     itertools.product(
-        ["mass_balance", "paper"], ["borchert_honda", "priority"], ENVIRONMENTS, [False, True]
+        ["mass_balance", "paper"], ["borchert_honda", "priority", "balance"], ENVIRONMENTS
     )
 )
 
@@ -113,13 +113,13 @@ def test_killed_and_resumed(straight: Run, tmp_path: Path) -> None:
         assert_same_runs(straight, run)
 
 
-@pytest.mark.parametrize(("mode", "fate", "environment", "balance"), MATRIX)
+@pytest.mark.parametrize(("mode", "fate", "environment"), MATRIX)
 def test_restored_stand_goes_on_the_same(
-    tmp_path: Path, mode: str, fate: str, environment: str, balance: bool
+    tmp_path: Path, mode: str, fate: str, environment: str
 ) -> None:
     scenario = tiny(
         f"mode={mode}",
-        f"growth={{bud_fate='{fate}', balance={str(balance).lower()}}}",
+        f"growth.bud_fate={fate}",
         "planting.density_ha=500",
         *ENVIRONMENTS[environment],
     )

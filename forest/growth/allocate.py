@@ -1,7 +1,7 @@
 """Allocate: each bud learns how many metamers it may make and how long they are.
 
 One driver runs over the trees; what happens to one tree reads from top to bottom in
-`_allocate_balanced` (mass balance) and `_allocate_paper` (Palubicki's v_base = alpha Q_base).
+`_allocate_balanced` (mass balance) and `_allocate_paper` (no costs).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from forest import random
 from forest._jit import driver, njit
 from forest._threads import in_threads
-from forest.growth.balance import growth_shares
+from forest.growth.balance import hand_up, hand_up_priced, know_limbs, trunk_growth, wood_of
 from forest.growth.bud_fate import gather_light, share_borchert_honda, share_priority
 from forest.growth.budget import (
     INCOME,
@@ -26,6 +26,7 @@ from forest.growth.budget import (
 )
 from forest.growth.curves import curve
 from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
+from forest.growth.limbs import Limbs, Tree
 from forest.growth.parameters import (
     LENGTH_BY_ORDER,
     MAX_ORDERS,
@@ -36,7 +37,7 @@ from forest.growth.parameters import (
     Year,
 )
 from forest.random import STREAM_ABORT, STREAM_FATE
-from forest.trees.metamers import LATERAL, TERMINAL, Metamers
+from forest.trees.metamers import LATERAL, NO_ROOM_LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
 
 
@@ -62,31 +63,13 @@ def unit_costs(traits, sp):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _share(t, sp, age, parts, v_base, priority, balance, work, ints):  # type: ignore[no-untyped-def]
+def _share(t, sp, age, tree, v_base, priority, work, ints):  # type: ignore[no-untyped-def]
     """Share v_base among the buds by the scenario's bud-fate model.
 
-    `priority` and `balance` are True or None: numba compiles no branch that hangs on a None.
+    `priority` is True or None: numba compiles no branch that hangs on a None.
     """
-    parent, state, order, tip, length, pipe, light = parts
-    n = len(parent)
+    parent, state, order = tree.parent, tree.state, tree.order
     q_main, q_side, v_main, v_side = work[0], work[1], work[2], work[3]
-    weights = work[6:8]
-    if balance is None:
-        for i in range(n):
-            weights[0, i] = 1.0
-            weights[1, i] = 1.0
-    else:
-        traits = (
-            t.of[sp].density,
-            t.of[sp].min_growth,
-            t.of[sp].offset_gain,
-            t.of[sp].light_gain,
-            t.of[sp].offset_length,
-            t.of[sp].pipe_exponent,
-        )
-        growth_shares(
-            parent, state, tip, length, pipe, light, traits, weights, work[8:11], ints[0:2]
-        )
     control = np.empty(MAX_ORDERS)
     if priority is None:
         for o in range(MAX_ORDERS):
@@ -97,7 +80,6 @@ def _share(t, sp, age, parts, v_base, priority, balance, work, ints):  # type: i
             order,
             q_main,
             q_side,
-            weights,
             control,
             t.of[sp].max_order,
             v_base,
@@ -113,7 +95,6 @@ def _share(t, sp, age, parts, v_base, priority, balance, work, ints):  # type: i
             order,
             q_main,
             q_side,
-            weights,
             control,
             (t.of[sp].w_max, t.of[sp].w_min, t.of[sp].kappa),
             t.of[sp].max_order,
@@ -161,35 +142,74 @@ def _hold_back(arena, s, e, t, sp, year, tree_id):  # type: ignore[no-untyped-de
 
 
 @njit
-def _parts(arena, s, e):  # type: ignore[no-untyped-def]
-    """One tree's part of the fields that bud fate reads."""
-    return (
+def tree_part(arena, s, e):  # type: ignore[no-untyped-def]
+    """One tree's part of the fields that bud fate and balance read."""
+    return Tree(
         arena.parent[s:e],
         arena.state[s:e],
         arena.order[s:e],
         arena.tip[s:e],
+        arena.bud[s:e],
         arena.length[s:e],
         arena.pipe[s:e],
         arena.light[s:e],
+        arena.resource[s:e],
     )
 
 
 @njit
+def _survey(arena, s, tree, t, sp, year, tree_id, units, work, ints):  # type: ignore[no-untyped-def]
+    """Find the buds that may start a limb, and know the limbs with their growth rates."""
+    limbs = Limbs(ints[0], ints[1], work[6], work[7], work[8], work[9], work[10], work[11], work[0])
+    drawn = _has_shoot_curves(t, sp)
+    for i in range(len(tree.parent)):
+        state = tree.state[i]
+        order = np.int64(tree.order[i])
+        may = state & LATERAL and not state & NO_ROOM_LATERAL and order < t.of[sp].max_order
+        if may and drawn:
+            k = s + i
+            may = _shoots(
+                t,
+                sp,
+                year,
+                tree_id,
+                arena.serial[k],
+                arena.shoot_height[k],
+                order + 1,
+                arena.length[k],
+            )
+        limbs.bud[i] = 1.0 if may else 0.0
+    know_limbs(tree, t, sp, year, units, limbs)
+    return limbs
+
+
+@njit
 def _allocate_paper(arena, trees, row, t, year, priority, balance, work, ints):  # type: ignore[no-untyped-def]
-    """Palubicki 4.2: v_base = alpha Q_base."""
+    """Without costs: Palubicki's v_base = alpha Q_base (4.2), or what the trunk can support."""
     s = trees.start[row]
     n = trees.size[row]
     e = s + n
     sp = trees.species[row]
-    parts = _parts(arena, s, e)
-    q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
-    age = np.float64(year.step - trees.birth[row])
-    _share(t, sp, age, parts, t.of[sp].alpha * q_base, priority, balance, work, ints)
-    for i in range(n):
-        arena.resource[s + i, 0] = work[2, i] if arena.state[s + i] & TERMINAL else 0.0
-        arena.resource[s + i, 1] = work[3, i] if arena.state[s + i] & LATERAL else 0.0
-    if _has_shoot_curves(t, sp):
-        _hold_back(arena, s, e, t, sp, year, trees.tree_id[row])
+    tree = tree_part(arena, s, e)
+    tree_id = trees.tree_id[row]
+    if balance is None:
+        q_base = gather_light(tree.parent, tree.state, tree.light, work[0], work[1])
+        age = np.float64(year.step - trees.birth[row])
+        _share(t, sp, age, tree, t.of[sp].alpha * q_base, priority, work, ints)
+        for i in range(n):
+            arena.resource[s + i, 0] = work[2, i] if arena.state[s + i] & TERMINAL else 0.0
+            arena.resource[s + i, 1] = work[3, i] if arena.state[s + i] & LATERAL else 0.0
+        if _has_shoot_curves(t, sp):
+            _hold_back(arena, s, e, t, sp, year, tree_id)
+    else:
+        units = unit_costs(t, sp)
+        wood = wood_of(t, sp, year.paper)
+        limbs = _survey(arena, s, tree, t, sp, year, tree_id, units, work, ints)
+        e_0 = trunk_growth(tree, limbs, wood, t.of[sp].thickening)
+        hand_up(tree, e_0, units, t.of[sp].max_metamers, wood, limbs, work[2], work[3])
+        for i in range(n):
+            arena.resource[s + i, 0] += np.float32(work[2, i])
+            arena.resource[s + i, 1] = np.float32(work[3, i])
 
 
 @njit
@@ -239,9 +259,9 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
     n = trees.size[row]
     e = s + n
     sp = trees.species[row]
-    parts = _parts(arena, s, e)
+    tree = tree_part(arena, s, e)
     path, pipe_path = work[4], work[5]
-    path_lengths(parts[0], parts[2], parts[4], t.of[sp].branch_pipe, path, pipe_path)
+    path_lengths(tree.parent, tree.order, tree.length, t.of[sp].branch_pipe, path, pipe_path)
     rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
     income, leaves, upkeep = _keep_sites(
         arena, s, n, t, sp, year, trees.tree_id[row], rate, path, pipe_path
@@ -257,33 +277,43 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
     poor = income - leaves - upkeep < t.of[sp].suppression_ratio * income or income <= 0.0
     trees.bad_years[row] = trees.bad_years[row] + 1 if poor else 0
 
-    q_base = gather_light(parts[0], parts[1], parts[6], work[0], work[1])
-    age = np.float64(year.step - trees.birth[row])
-    v_base = t.of[sp].alpha * q_base / year.full_light
-    _share(t, sp, age, parts, v_base, priority, balance, work, ints)
+    price = unit_costs(t, sp)
+    pipe_cost = 0.25 * np.pi * t.of[sp].density * t.of[sp].first_pipe ** 2
+    budget = (1.0 - t.of[sp].ring_fraction) * spend
+    if balance is None:
+        q_base = gather_light(tree.parent, tree.state, tree.light, work[0], work[1])
+        age = np.float64(year.step - trees.birth[row])
+        v_base = t.of[sp].alpha * q_base / year.full_light
+        _share(t, sp, age, tree, v_base, priority, work, ints)
+    else:
+        tree_id = trees.tree_id[row]
+        limbs = _survey(arena, s, tree, t, sp, year, tree_id, price, work, ints)
+        prices = (pipe_path, pipe_cost, t.of[sp].branch_pipe)
+        hand_up_priced(
+            tree, budget, price, prices, wood_of(t, sp, year.paper), limbs, work[2], work[3]
+        )
     for i in range(n):
         if not arena.state[s + i] & TERMINAL:
             work[2, i] = 0.0
         if not arena.state[s + i] & LATERAL:
             work[3, i] = 0.0
-    resource = arena.resource[s:e]
-    pipe_cost = 0.25 * np.pi * t.of[sp].density * t.of[sp].first_pipe ** 2
+    resource = tree.resource
     scale = affordable_scale(
         resource,
         work[2],
         work[3],
         pipe_path,
-        parts[2],
-        unit_costs(t, sp),
+        tree.order,
+        price,
         pipe_cost,
         t.of[sp].branch_pipe,
         int(t.of[sp].max_metamers),
-        (1.0 - t.of[sp].ring_fraction) * spend,
+        budget,
     )
     for i in range(n):
         resource[i, 0] += np.float32(scale * work[2, i])
         resource[i, 1] += np.float32(scale * work[3, i])
-    if _has_shoot_curves(t, sp):
+    if balance is None and _has_shoot_curves(t, sp):
         _hold_back(arena, s, e, t, sp, year, trees.tree_id[row])
 
 
@@ -321,8 +351,8 @@ def allocate(
 ) -> None:
     """Allocate the year's resource in every tree.
 
-    `paper`, `priority` and `balance` are True, or None for the mass balance, the Borchert-Honda
-    model and no balance; what hangs on a None is not compiled.
+    `paper` is True, or None for the mass balance; `priority` and `balance` are True for these
+    models, None both for Borchert-Honda. What hangs on a None is not compiled.
 
     Sets `arena.resource` (v of each bud; in mass-balance mode with the carried fraction) and, in
     mass-balance mode, books income, leaves, upkeep and spend in `accounts` (trees, ACCOUNTS).

@@ -64,7 +64,7 @@ def gather_light(parent, state, light, q_main, q_side):  # type: ignore[no-untyp
 
 @njit
 def share_borchert_honda(  # type: ignore[no-untyped-def]
-    parent, state, order, q_main, q_side, weights, bias, max_order, v_base, v_main, v_side
+    parent, state, order, q_main, q_side, bias, max_order, v_base, v_main, v_side
 ):
     """Share the resource by the extended Borchert-Honda model; one forward scan (4.2, Fig. 8a).
 
@@ -72,8 +72,6 @@ def share_borchert_honda(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    weights : float64 (2, n)
-        Factors on Q_m and Q_l (ones, or the mean growth rates of `balance`).
     bias : float64 (orders,)
         lambda of each order; the last holds for higher orders.
     max_order : int
@@ -91,8 +89,8 @@ def share_borchert_honda(  # type: ignore[no-untyped-def]
         else:
             v = v_side[parent[i]]
         lam = bias[min(np.int64(order[i]), last)]
-        main = lam * q_main[i] * weights[0, i]
-        side = (1.0 - lam) * q_side[i] * weights[1, i]
+        main = lam * q_main[i]
+        side = (1.0 - lam) * q_side[i]
         if order[i] >= max_order and state[i] & LATERAL:
             side = 0.0
         total = main + side
@@ -136,7 +134,6 @@ def share_priority(  # type: ignore[no-untyped-def]
     order,
     q_main,
     q_side,
-    weights,
     control,
     shape,
     max_order,
@@ -214,12 +211,11 @@ def share_priority(  # type: ignore[no-untyped-def]
         for k in range(count):
             j = items[k]
             place = k + 1 if has_tip and k >= tip_place else k
-            share = q_side[j] * weights[1, j] * _weight(place, total_items, w_max, w_min, kappa)
+            share = q_side[j] * _weight(place, total_items, w_max, w_min, kappa)
             v_side[j] = share
             total += share
         if has_tip:
-            share = q_main[tip] * weights[0, tip]
-            share *= _weight(tip_place, total_items, w_max, w_min, kappa)
+            share = q_main[tip] * _weight(tip_place, total_items, w_max, w_min, kappa)
             v_main[tip] = share
             total += share
         scale = v / total if total > 0.0 else 0.0

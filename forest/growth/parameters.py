@@ -72,6 +72,8 @@ TRAITS = (
     "suppression_years",
     "deficit_years",
     "abortion",
+    "support",
+    "thickening",
     "min_growth",
     "offset_gain",
     "light_gain",
@@ -112,6 +114,7 @@ class Year(NamedTuple):
     income_factor: float
     full_light: float
     paper: bool
+    balance: bool = False
 
 
 def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
@@ -186,6 +189,8 @@ def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
         "suppression_years": each("carbon", "suppression_years"),
         "deficit_years": each("carbon", "deficit_years"),
         "abortion": each("carbon", "abortion_probability"),
+        "support": each("balance", "height_limit_m", np.pi / 3.0),
+        "thickening": each("balance", "thickening_m_kg_m2"),
         "min_growth": each("balance", "min_growth"),
         "offset_gain": each("balance", "offset_gain"),
         "light_gain": each("balance", "light_gain"),

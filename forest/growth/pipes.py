@@ -3,7 +3,8 @@
 In paper mode every new leaf adds d0^n to each internode below it and nothing is ever taken away:
 d^n = d1^n + d2^n with a memory of past leaves. In mass-balance mode pipes add by area (n = 2):
 new metamers get their primary wood and first pipes, limbs too thin for their load are thickened,
-and the rest of the year's spend is laid down as pipes from the sites that earned it.
+and the rest of the year's spend is laid down as pipes from the sites that earned it. Under the
+balance model in paper mode axes are cones (Hart & Baker 2003).
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 
 from forest._jit import driver, njit
 from forest._threads import in_threads
-from forest.growth.allocate import income_rate
+from forest.growth.allocate import income_rate, tree_part, unit_costs
+from forest.growth.balance import know_limbs, lay_cones, wood_of
 from forest.growth.budget import (
     EXTENSION,
     RESERVE_CHANGE,
@@ -22,13 +24,11 @@ from forest.growth.budget import (
     path_lengths,
     site_income,
 )
-from forest.growth.dealing import BINS, FLOATS, Deal, Scratch
+from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
+from forest.growth.limbs import Limbs
 from forest.growth.parameters import SpeciesTraits, Year
 from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
-
-#: k of supports(R, d) = k d R^2 from the 300-foot limit, m (Hart & Baker 2003, eq. 8).
-SUPPORT = np.pi * 30.48
 
 
 @njit
@@ -44,13 +44,15 @@ def add_pipes(parent, birth, step, pipe, strand, flow):  # type: ignore[no-untyp
 
 
 @njit
-def reinforce(parent, length, pipe, density, leaf_mass, state, budget, mass, lack):  # type: ignore[no-untyped-def]
+def reinforce(parent, length, pipe, wood, leaf_mass, state, budget, mass, lack):  # type: ignore[no-untyped-def]
     """Thicken first what is thinner than its load needs (Hart & Baker 2003, eqs 6, 7, 10, 18).
 
     needs_to_support(M, d) = sqrt(M / (k d)), asked of every metamer for the mass it carries.
 
     Parameters
     ----------
+    wood : (density, support)
+        d, kg/m3; k, m.
     budget : float
         Dry mass at hand, kg; the reinforcement is scaled down to it.
     mass, lack : float64 (n,)
@@ -62,6 +64,7 @@ def reinforce(parent, length, pipe, density, leaf_mass, state, budget, mass, lac
         Dry mass laid down, kg.
     """
     n = len(parent)
+    density, support = wood
     volume = 0.25 * np.pi * density
     for i in range(n):
         s = state[i]
@@ -71,7 +74,7 @@ def reinforce(parent, length, pipe, density, leaf_mass, state, budget, mass, lac
         mass[parent[i]] += mass[i]
     cost = 0.0
     for i in range(n):
-        needed = 4.0 * mass[i] / (SUPPORT * density)
+        needed = 4.0 * mass[i] / (support * density)
         lack[i] = max(0.0, needed - np.float64(pipe[i]))
         cost += volume * lack[i] * np.float64(length[i])
     if cost <= 0.0:
@@ -105,7 +108,21 @@ def lay_ring(parent, order, pipe, sapwood, branch_pipe, keep, flow):  # type: ig
 
 
 @njit
-def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: ignore[no-untyped-def]
+def _favour_light_side(arena, s, e, t, sp, year, surplus, work, ints):  # type: ignore[no-untyped-def]
+    """Weight each site's surplus by the growth rate of its limb.
+
+    In the paper a limb's thickening is paid out of what growth rates hand up (eqs 18, 19).
+    """
+    limbs = Limbs(ints[0], ints[1], work[6], work[7], work[8], work[9], work[10], work[11], work[4])
+    for i in range(e - s):
+        limbs.bud[i] = 0.0
+    know_limbs(tree_part(arena, s, e), t, sp, year, unit_costs(t, sp), limbs)
+    for i in range(e - s):
+        surplus[i] *= limbs.rate[limbs.head[i]]
+
+
+@njit
+def _thicken_balanced(arena, trees, row, t, year, accounts, work, ints):  # type: ignore[no-untyped-def]
     """Book the extension, then lay down this year's ring out of the rest of the spend."""
     s = trees.start[row]
     n = trees.size[row]
@@ -143,10 +160,14 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work):  # type: igno
             light = np.float64(arena.light[s + i])
             earned = site_income(light, path[i], rate, t.of[sp].hydraulic_length)
             surplus[i] *= max(earned - leaf, 0.0)
-            total += surplus[i]
+    if year.balance:
+        _favour_light_side(arena, s, e, t, sp, year, surplus, work, ints)
+    for i in range(n):
+        total += surplus[i]
     rest = max(accounts[row, SPEND] - extension, 0.0)
+    wood = (t.of[sp].density, t.of[sp].support)
     support = reinforce(
-        parent, length, pipe, t.of[sp].density, t.of[sp].leaf_mass, state, rest, work[4], work[5]
+        parent, length, pipe, wood, t.of[sp].leaf_mass, state, rest, work[4], work[5]
     )
     ring = rest - support
     if total > 0.0:
@@ -182,9 +203,19 @@ def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, ac
             n = np.int64(trees.size[row])
             f = shared.place[b] * FLOATS
             work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
-            if year.paper:
-                s = trees.start[row]
-                sp = trees.species[row]
+            s = trees.start[row]
+            sp = trees.species[row]
+            if year.paper and year.balance:
+                lay_cones(
+                    arena.parent[s : s + n],
+                    arena.state[s : s + n],
+                    arena.length[s : s + n],
+                    arena.pipe[s : s + n],
+                    wood_of(traits, sp, year.paper),
+                    work[0],
+                    work[1],
+                )
+            elif year.paper:
                 add_pipes(
                     arena.parent[s : s + n],
                     arena.birth[s : s + n],
@@ -194,7 +225,9 @@ def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, ac
                     work[0],
                 )
             else:
-                _thicken_balanced(arena, trees, row, traits, year, accounts, work)
+                g = shared.place[b] * INTEGERS
+                ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
+                _thicken_balanced(arena, trees, row, traits, year, accounts, work, ints)
 
 
 def thicken(

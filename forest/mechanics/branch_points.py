@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import FLOATS, INTEGERS, Workbench, deal
-from forest.growth.pipes import SUPPORT
+from forest.growth.limbs import SUPPORT
 from forest.mechanics.stems import StemSpecies, wood_radius
 from forest.trees.metamers import LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees

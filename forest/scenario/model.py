@@ -68,11 +68,12 @@ class Weather(Table):
 class Growth(Table):
     """Which rules decide the fate of buds."""
 
-    bud_fate: Literal["borchert_honda", "priority"] = quantity(
-        "borchert_honda", "how an axis shares its resource (Palubicki et al. 2009, 4.2)", unit=""
-    )
-    balance: bool = quantity(
-        False, "keep trees in balance (growth rates of Hart and Baker 2003)", unit=""
+    bud_fate: Literal["borchert_honda", "priority", "balance"] = quantity(
+        "borchert_honda",
+        "how buds share what there is to grow: by light and apical control (Palubicki et al. 2009, "
+        "4.2), or by the growth rates that keep the tree in balance, within what its limbs can "
+        "support (Hart and Baker 2003, 4.1)",
+        unit="",
     )
 
 

@@ -34,7 +34,7 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("years", f"{scenario.years} ({scenario.start_year} to {last})"),
         ("mode", scenario.mode),
         ("environment", " + ".join(parts)),
-        ("bud fate", scenario.growth.bud_fate + (", balanced" * scenario.growth.balance)),
+        ("bud fate", scenario.growth.bud_fate),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
         ("seed", str(scenario.seed)),
         ("tables", ", ".join(scenario.output.tables) or "none"),

@@ -219,13 +219,30 @@ class Carbon(Table):
 
 
 class Balance(Table):
-    """Growth rates that keep a tree in balance (Hart and Baker 2003, eqs 13-15)."""
+    """Support, and the allocation that keeps a tree in balance (Hart and Baker 2003, 3.4, 4.1)."""
 
+    height_limit_m: float = quantity(
+        91.44,
+        "height of the tallest cone of the wood that supports itself (eq. 8: 300 feet)",
+        unit="m",
+        ge=1,
+        le=10000,
+    )
+    thickening_m_kg_m2: float = quantity(
+        0.0003,
+        "radius that the trunk gains in a year per lit leaf area and mass of the tree, in paper "
+        "mode (alpha_photosynthesis, eq. 16)",
+        unit="m kg/m2",
+        ge=0,
+        le=10,
+    )
     min_growth: float = quantity(0.1, "least growth rate of a limb", ge=0, le=1)
-    offset_gain: float = quantity(0.45, "weight of the limb's offset o_i", ge=0, le=10)
-    light_gain: float = quantity(1.0, "weight of the limb's light p_i", ge=0, le=10)
+    offset_gain: float = quantity(0.45, "weight of the limb's offset, 1 + o_i", ge=0, le=10)
+    light_gain: float = quantity(
+        1.0, "weight of the limb's lit leaf area p_i", unit="1/m2", ge=0, le=1000
+    )
     offset_length_factor: float = quantity(
-        10.0, "length that scales the offset, in radii of the trunk's base", gt=0, le=1000
+        1.0, "length that scales the offset, in radii of the trunk's base", gt=0, le=1000
     )
 
 

@@ -264,7 +264,7 @@ def test_no_trees_and_no_leaves():
 @pytest.mark.parametrize(
     "changes",
     [
-        ["environment={rendered={directions=2}}", "growth.balance=true"],
+        ["environment={rendered={directions=2}}", "growth.bud_fate=balance"],
         ["environment={rendered={response='flat_above_20'}, markers={}}", "mode=paper"],
         [
             "plot.boundary=open",

@@ -117,6 +117,7 @@ def grow_year(
     light_everything(arena.metamers, trees, year.step)
     shared = deal(trees.size)
     scratch = bench.scratch(shared)
+    year = year._replace(balance=balance)
     models = (year.paper or None, priority or None, balance or None)
     allocate(arena.metamers, trees, shared, scratch, traits, year, accounts, *models)
     shed(arena.metamers, trees, shared, scratch, traits, not year.paper)

@@ -34,12 +34,6 @@ class Case:
         self.light = self.m.light[self.here]
         self.q_main, self.q_side = np.empty(k), np.empty(k)
         self.v_main, self.v_side = np.empty(k), np.empty(k)
-        self.weights = rng.uniform(0.2, 2.0, (2, k))
-        self.weight_of = {
-            (i, arm): self.weights[row, i]
-            for row, arm in enumerate(("main", "side"))
-            for i in range(k)
-        }
         self.q_base = gather_light(self.parent, self.state, self.light, self.q_main, self.q_side)
         self.nodes = read_plant(self.m, self.trees, 0)
 
@@ -81,7 +75,6 @@ def test_borchert_honda(seed: int, lam: float, max_order: int) -> None:
         case.order,
         case.q_main,
         case.q_side,
-        case.weights,
         bias,
         float(max_order),
         2.0 * case.q_base,
@@ -93,7 +86,6 @@ def test_borchert_honda(seed: int, lam: float, max_order: int) -> None:
         case.nodes[0],
         2.0 * case.q_base,
         lambda order: bias[min(order, 7)],
-        case.weight_of,
         max_order,
         expected,
     )
@@ -109,7 +101,6 @@ def _share_priority(
         case.order,
         case.q_main,
         case.q_side,
-        case.weights,
         control,
         shape,
         float(max_order),
@@ -141,7 +132,6 @@ def test_priority(
         case.nodes[0],
         v,
         lambda order: control[min(order, 7)] > 0.0,
-        case.weight_of,
         lambda k, of: slow.weight_of_place(k, of, 1.0, w_min, kappa),
         max_order,
         expected,
@@ -159,7 +149,6 @@ def _pole(lights: list[float], state: list[int]) -> Case:
     case.order = np.zeros(k, np.uint8)
     case.light = np.array(lights, np.float32)
     case.q_main, case.q_side, case.v_main, case.v_side = np.empty((4, k))
-    case.weights = np.ones((2, k))
     case.q_base = gather_light(case.parent, case.state, case.light, case.q_main, case.q_side)
     return case
 

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from forest.growth.budget import ACCOUNTS, EXTENSION, RESERVE_CHANGE, RING, SPEND
 from forest.growth.dealing import Workbench, deal
-from forest.growth.pipes import SUPPORT, reinforce, thicken
+from forest.growth.pipes import reinforce, thicken
 from forest.trees.metamers import LATERAL
 from tests.builders import random_arena
 from tests.growth.growing import copied, extent, make_species, make_traits, make_year
 from tests.growth.test_budget import prices_of
+from tests.reference import balance
 from tests.reference import pipes as slow
 from tests.reference.plant import read_plant
 
@@ -71,8 +72,25 @@ def test_paper_mode_remembers() -> None:
     np.testing.assert_array_equal(m.pipe[s : s + n // 2], whole[: n // 2])
 
 
-@given(seeds, st.sampled_from([0.0, 0.02, 0.4, 10.0]), st.booleans())
-def test_mass_balance(seed: int, spend: float, dark: bool) -> None:
+def _growth_rates(nodes, bud) -> dict[int, float]:  # type: ignore[no-untyped-def]
+    """Growth rate of each metamer's limb, by the twin of the balance model."""
+    t = TREE
+    traits = balance.Traits(
+        density=t.wood.density_kg_m3,
+        twig=t.wood.twig_diameter_m / 2,
+        cones=False,
+        light_gain=t.balance.light_gain,
+        offset_length=t.balance.offset_length_factor,
+        area=t.leaves.area_m2,
+        unit=(t.architecture.internode_length_m,),
+    )
+    trunk = balance.limb_of(nodes[0], traits, bud, lambda node: False)
+    limbs = [limb for limb in trunk.above() if limb.nodes]
+    return {n.index: limb.rate(trunk) for limb in limbs for n in limb.nodes}
+
+
+@given(seeds, st.sampled_from([0.0, 0.02, 0.4, 10.0]), st.booleans(), st.booleans())
+def test_mass_balance(seed: int, spend: float, dark: bool, balanced: bool) -> None:
     """Pipes, sapwood and accounts; the mass that is laid down is the mass that is booked."""
     rng = np.random.default_rng(seed)
     m, trees = random_arena(rng, 1, 30)
@@ -83,10 +101,12 @@ def test_mass_balance(seed: int, spend: float, dark: bool) -> None:
     if dark:
         m.light[here] = 0.0
     trees.reserve[0] = 1.0
-    traits, year = make_traits(TREE), make_year(STEP)
+    traits, year = make_traits(TREE), make_year(STEP, balance=balanced)
     prices = prices_of(traits, float(trees.vigour[0]), year)
     nodes = read_plant(m, trees, 0)
-    expected = slow.thicken_balanced(nodes, STEP, prices, spend)
+    bud = m.bud[here].astype(float)
+    favour = (lambda grown: _growth_rates(grown, lambda i: bud[i])) if balanced else None
+    expected = slow.thicken_balanced(nodes, STEP, prices, spend, favour)
     accounts = np.zeros((1, ACCOUNTS))
     accounts[0, SPEND] = spend
     before = copied(m)
@@ -124,7 +144,8 @@ def test_a_thin_limb_is_thickened_first() -> None:
             for node in read_plant(m, trees, 0)
         ]
     )
-    arguments = (m.parent[here], m.length[here], m.pipe[here], density, leaf_mass, m.state[here])
+    wood = (density, slow.SUPPORT)
+    arguments = (m.parent[here], m.length[here], m.pipe[here], wood, leaf_mass, m.state[here])
     thin = m.pipe[here].copy()
     half = reinforce(*arguments, 1e-4, *np.empty((2, n)))
     assert half == pytest.approx(1e-4)
@@ -133,6 +154,3 @@ def test_a_thin_limb_is_thickened_first() -> None:
     radius = np.sqrt(m.pipe[here]) / 2
     needed = np.array([slow.needs_to_support(w, density) for w in load])
     np.testing.assert_allclose(radius, needed, rtol=1e-5)
-    # the 300-foot limit: a cone of that height carries itself exactly (eq. 8)
-    cone = density * np.pi * 91.44 * 0.5**2 / 3
-    np.testing.assert_allclose(SUPPORT * density * 0.5**2, cone)

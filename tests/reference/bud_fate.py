@@ -7,7 +7,6 @@ from collections.abc import Callable
 from tests.reference.plant import Node
 
 Share = dict[tuple[int, str], float]
-ByBud = dict[tuple[int, str], float]
 
 
 def light_of_terminal(node: Node) -> float:
@@ -33,24 +32,23 @@ def borchert_honda(
     node: Node,
     v: float,
     bias: Callable[[int], float],
-    weight: ByBud,
     max_order: int,
     out: Share,
 ) -> None:
     """Divide v at a branching point and go on into both arms; `out` holds what buds get."""
     lam = bias(node.order)
-    main = lam * light_of_terminal(node) * weight[node.index, "main"]
-    side = (1.0 - lam) * light_of_lateral(node) * weight[node.index, "side"]
+    main = lam * light_of_terminal(node)
+    side = (1.0 - lam) * light_of_lateral(node)
     if node.lateral and node.order >= max_order:
         side = 0.0
     v_main = v * main / (main + side) if main + side > 0.0 else 0.0
     v_side = v * side / (main + side) if main + side > 0.0 else 0.0
     if node.onward:
-        borchert_honda(node.onward, v_main, bias, weight, max_order, out)
+        borchert_honda(node.onward, v_main, bias, max_order, out)
     elif node.terminal:
         out[node.index, "main"] = v_main
     if node.branch:
-        borchert_honda(node.branch, v_side, bias, weight, max_order, out)
+        borchert_honda(node.branch, v_side, bias, max_order, out)
     elif node.lateral:
         out[node.index, "side"] = v_side
 
@@ -66,7 +64,6 @@ def priority(
     head: Node,
     v: float,
     under_control: Callable[[int], bool],
-    weight: ByBud,
     place_weight: Callable[[int, int], float],
     max_order: int,
     out: Share,
@@ -87,13 +84,10 @@ def priority(
     if last.terminal and under_control(head.order):
         supported.sort(key=lambda item: item[1] != "main")
     n = len(supported)
-    shares = [
-        q * place_weight(k, n) * weight[node.index, arm]
-        for k, (node, arm, q, _) in enumerate(supported)
-    ]
+    shares = [q * place_weight(k, n) for k, (_, _, q, _) in enumerate(supported)]
     for (node, arm, _, _), share in zip(supported, shares, strict=True):
         got = v * share / sum(shares) if sum(shares) > 0.0 else 0.0
         if arm == "side" and node.branch:
-            priority(node.branch, got, under_control, weight, place_weight, max_order, out)
+            priority(node.branch, got, under_control, place_weight, max_order, out)
         else:
             out[node.index, arm] = got

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from tests.reference.budget import Prices, income, leaf_cost, pipe_path
@@ -38,8 +38,17 @@ def needs_to_support(load: float, density: float) -> float:
     return math.sqrt(load / (SUPPORT * density))
 
 
-def thicken_balanced(nodes: Sequence[Node], step: int, prices: Prices, spend: float) -> Ring:
-    """New metamers, then what is too thin for its load, then the ring out of the rest."""
+def thicken_balanced(
+    nodes: Sequence[Node],
+    step: int,
+    prices: Prices,
+    spend: float,
+    favour: Callable[[Sequence[Node]], Mapping[int, float]] | None = None,
+) -> Ring:
+    """New metamers, then what is too thin for its load, then the ring out of the rest.
+
+    `favour` gives the growth rate of each metamer's limb, by which the ring is weighted.
+    """
     pipe = {n.index: n.pipe for n in nodes}
     flow = {n.index: 0.0 for n in nodes}  # squared diameter that sets out from a node
     extension = 0.0
@@ -49,6 +58,9 @@ def thicken_balanced(nodes: Sequence[Node], step: int, prices: Prices, spend: fl
             flow[n.index] += prices.first_pipe**2
             extension += prices.wood(prices.twig_diameter**2, n.length) + prices.leaf_mass
             extension += prices.wood(prices.first_pipe**2, pipe_path(n, prices.branch_pipe))
+    for n in nodes:
+        n.pipe = pipe[n.index]
+    weight = favour(nodes) if favour else None
     rest = max(0.0, spend - extension)
 
     def load(n: Node) -> float:
@@ -71,6 +83,8 @@ def thicken_balanced(nodes: Sequence[Node], step: int, prices: Prices, spend: fl
             continue
         sites = n.buds + sum(child.birth == step for child in n.children())
         surplus[n.index] = sites * max(0.0, income(n, prices) - leaf_cost(prices))
+        if weight is not None:
+            surplus[n.index] *= weight[n.index]
     total = sum(surplus.values())
     for n in nodes:
         if total > 0.0 and surplus.get(n.index, 0.0) > 0.0:
