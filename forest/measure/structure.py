@@ -62,6 +62,10 @@ def _tree_of_places(
     return cKDTree(wrapped, boxsize=size_m)
 
 
+#: Trees from which on threads are worth starting.
+_WORTH_THREADS = 2000
+
+
 class Neighbours:
     """The four nearest neighbours of every tree, found once and used by several indices.
 
@@ -91,7 +95,8 @@ class Neighbours:
         if k < 1:
             return
         tree = _tree_of_places(np.column_stack((x, y)), size_m, periodic)
-        distance, index = tree.query(tree.data, k + 1, workers=thread_count())
+        workers = thread_count() if n > _WORTH_THREADS else 1
+        distance, index = tree.query(tree.data, k + 1, workers=workers)
         # A tree is its own nearest neighbour, except that one on the same spot may come before
         # it, or push it off the list: drop itself, or else the farthest.
         own = index == np.arange(n)[:, None]

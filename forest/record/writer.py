@@ -273,8 +273,6 @@ class RunWriter:
                 if name in rows:
                     table.append(rows[name])
             self._samples.append(year, samples or {})
-            # Two flushes, so that the step is the last thing to change in the file.
-            self._file.flush()
             step = {"year": year, **self.row_counts()}
             self._steps.append({name: np.array([value]) for name, value in step.items()})
             self._commit()

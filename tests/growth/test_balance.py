@@ -197,7 +197,7 @@ def test_hand_up_priced(seed: int, budget: float, thin: bool) -> None:
 
     def price(node: slow.Node, order: int) -> float:
         step = traits.unit_of(order) * (branch_pipe if order > 0 else 1.0)
-        return float(case.units[order, 0] + pipe_cost * (pipe_path[node.index] + step))
+        return float(case.units[min(order, 7), 0] + pipe_cost * (pipe_path[node.index] + step))
 
     expected = slow.Grown()
     slow.hand_up_priced(case.trunk, budget, case.trunk, price, expected)
