@@ -1,7 +1,7 @@
 """A run's tables under the column names of FVS_TreeList and FVS_Summary2, in FVS' units.
 
-Names and meanings are those of the Forest Vegetation Simulator's output database (Keyser et al.,
-*Users guide to the database extension*; the tables are made in its `dbstrls` and `dbssumry`).
+Names and meanings are those of the Forest Vegetation Simulator's output database, as its source
+makes them (dbsqlite/dbstrls.f and dbssumry.f at github.com/USDAForestService).
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ TREELIST = ForeignTable(
         ("`TreeIndex`, `PtIndex`, `ActPt`", "places in FVS' memory and sample points"),
         ("`SpeciesFVS`, `SpeciesFIA`", "codes of FVS' variants and of the American inventory"),
         ("`TreeVal`, `SSCD`, `MistCD`, `MDefect`, `BDefect`, `TruncHt`, `EstHt`", "not simulated"),
-        ("`SCuFt`, `BdFt`, `Ht2TDCF`, `Ht2TDBF`", "sawlog rules of FVS' regions"),
+        ("`BdFt`, `Ht2TDCF`, `Ht2TDBF`", "sawlog rules of FVS' regions"),
     ),
 )
 
