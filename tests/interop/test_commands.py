@@ -83,5 +83,5 @@ def test_the_script_compares(
     assert "length_m" in capsys.readouterr().out
     with open_run(run_file) as run:
         assert len(simulated(run_file)) == len(run.samples)
-    with pytest.raises(InputError, match="unknown format '.ply'"):
+    with pytest.raises(InputError, match=r"unknown format '\.ply'"):
         measured([tmp_path / "x.ply"])
