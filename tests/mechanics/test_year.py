@@ -197,21 +197,25 @@ def test_rings_of_pines_that_lean_are_thick_below() -> None:
     assert compared > 0
 
 
-def test_rings_without_bending_lie_towards_the_centre_of_mass() -> None:
-    """At the foot of a pine's stem the thick side is where the crown is."""
-    stand = Stand(tiny("mechanics={bending=false}", "species={pinus_sylvestris={}}"))
-    steps(stand, YEARS)
+def test_rings_without_bending_are_thick_towards_the_load() -> None:
+    """In pines: below branches, and on the side of the crown at stems."""
+    stand = Stand(tiny("mechanics={bending=false}", "species={pinus_sylvestris={}}", "years=14"))
+    steps(stand, 14)
     assert stand.mechanics is not None
     assert stand.mechanics.settled is None
-    eccentricity, azimuth = stand.mechanics.thick_sides(stand.arena, stand.rows.start)
-    crowns = []
-    for tree_id in stand.rows.tree_id:
+    compared = [0, 0]
+    for row, tree_id in enumerate(stand.rows.tree_id):
         tree = stand.skeleton(int(tree_id))
+        index = stand.rows.start[row] + np.arange(len(tree))
+        eccentricity, azimuth = stand.mechanics.thick_sides(stand.arena, index)
         volume = tree.radius**2 * tree.length
-        middle = (0.5 * (tree.start + tree.end) * volume[:, None]).sum(axis=0) / volume.sum()
-        crowns.append(middle - tree.start[0])
-    x, y, _ = np.array(crowns).T
-    lopsided = (eccentricity > 0.0) & (np.hypot(x, y) > 0.02)
-    assert lopsided.sum() > 2
-    towards = np.cos(azimuth - np.arctan2(y, x))[lopsided]
-    assert np.all(towards > 0.5)  # leaves weigh as well
+        centre = (0.5 * (tree.start + tree.end) * volume[:, None]).sum(axis=0) / volume.sum()
+        stem = (tree.order == 0)[:, None]
+        x, y, _ = np.where(stem, centre - tree.start[0], tree.end - tree.start).T
+        towards = np.cos(azimuth - np.arctan2(y, x))
+        compared[0] += int(np.sum((eccentricity > 0.0) & (tree.order == 0)))
+        compared[1] += int(np.sum((eccentricity > 0.0) & (tree.order > 0)))
+        assert np.all(np.isnan(towards) == (eccentricity == 0.0))
+        assert np.all(towards[(eccentricity > 0.0) & (tree.order > 0)] > 0.999)
+        assert np.all(towards[(eccentricity > 0.0) & (tree.order == 0)] > 0.5)  # leaves weigh, too
+    assert min(compared) > 0
