@@ -1,0 +1,254 @@
+"""From the rows of `/rings` to dated series: one column of widths for each disc or radius."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from forest.dendro.names import short_ids
+from forest.errors import InputError, nearest
+
+#: What a frame of rings must hold; see `/rings` in the run file.
+RING_COLUMNS = (
+    "year",
+    "tree_id",
+    "species",
+    "stem_height_m",
+    "cambial_age",
+    "width_mm",
+    "eccentricity",
+    "thick_side_deg",
+)
+
+#: What `RingSeries.about` holds, with its dtypes.
+ABOUT = {
+    "tree_id": "int64",
+    "species": "str",
+    "stem_height_m": "float64",
+    "azimuth_deg": "float64",
+    "first_year": "int64",
+    "last_year": "int64",
+    "first_cambial_age": "int64",
+    "pith_offset": "int64",
+    "estimated_pith_offset": "float64",
+    "miss_mm": "float64",
+    "year_shift": "int64",
+}
+
+
+@dataclass(frozen=True)
+class RingSeries:
+    """Dated ring widths, and what is known of each series.
+
+    Attributes
+    ----------
+    widths : pandas.DataFrame
+        Widths in mm, indexed by calendar `Year` without gaps, one column per series. A missing
+        ring is 0; NaN stands before the first and after the last ring of a series.
+    about : pandas.DataFrame
+        A row per series, indexed by its `id`: `tree_id`, `species`, `stem_height_m`,
+        `azimuth_deg` (of a radius; NaN for means around the stem), `first_year`, `last_year`,
+        `first_cambial_age` (of the innermost ring in the series), `pith_offset` (rings between it
+        and the pith; 0 if the series begins at the pith), `estimated_pith_offset` (as one who sees
+        the core alone would estimate it; NaN where it is not a core), `miss_mm` (how far a core
+        passes the pith) and `year_shift` (see `moved`).
+    """
+
+    widths: pd.DataFrame
+    about: pd.DataFrame
+
+    def moved(self, years: int) -> RingSeries:
+        """Give the series dated `years` later (earlier, if negative).
+
+        Readers of ring files refuse years after the present: a run into the future is moved
+        before it is written. `about.year_shift` adds up all moves, so that the run's own years
+        are `first_year - year_shift` to `last_year - year_shift`.
+        """
+        widths = self.widths.copy()
+        widths.index = widths.index + years
+        about = self.about.copy()
+        for name in ("first_year", "last_year", "year_shift"):
+            about[name] += years
+        return RingSeries(widths, about)
+
+
+@dataclass(frozen=True)
+class Radius:
+    """One series before it has an id: rings of a disc, or those that a core holds."""
+
+    tree_id: int
+    species: str
+    stem_height_m: float
+    year: np.ndarray
+    width_mm: np.ndarray
+    first_cambial_age: int
+    azimuth_deg: float = np.nan
+    estimated_pith_offset: float = np.nan
+    miss_mm: float = np.nan
+
+
+def ring_series(rings: pd.DataFrame) -> RingSeries:
+    """Give the mean ring widths of every tree and stem height as dated series.
+
+    Parameters
+    ----------
+    rings : pandas.DataFrame
+        Rows of `/rings`, all or some: whole trees, heights or years.
+
+    Returns
+    -------
+    RingSeries
+        In order of tree and height. The id of a series is `T`, the number of the tree and, where
+        the tree has several heights, a letter (`A` the lowest); if that is longer than six
+        characters it is shortened (`forest.dendro.short_ids`), and `about` says whose it is.
+
+    Raises
+    ------
+    InputError
+        If a column is lacking, there are no rings, or a ring stands there twice.
+    """
+    return assemble(
+        [
+            Radius(
+                tree_id=int(disc["tree_id"].iloc[0]),
+                species=str(disc["species"].iloc[0]),
+                stem_height_m=height_of(disc),
+                year=disc["year"].to_numpy(),
+                width_mm=disc["width_mm"].to_numpy(),
+                first_cambial_age=int(disc["cambial_age"].iloc[0]),
+            )
+            for disc in discs(rings)
+        ]
+    )
+
+
+def discs(rings: pd.DataFrame) -> list[pd.DataFrame]:
+    """Cut a ring frame into discs: a frame per tree and height, a row per year, no year left out.
+
+    A year without a row between two others is a missing ring: its width is 0. A stem that
+    broke below the height and grew anew has a new pith there; the disc is of the new stem alone.
+
+    Raises
+    ------
+    InputError
+        If a column is lacking, there are no rings, or a ring stands there twice.
+    """
+    for name in RING_COLUMNS:
+        if name not in rings.columns:
+            hint = nearest(name, map(str, rings.columns)) if len(rings.columns) else ""
+            raise InputError(f"no column '{name}'", where="rings", expected=hint)
+    if not len(rings):
+        raise InputError("no rings", where="rings", expected="at least one row")
+    # In mm: heights are float32 in the file, and 1.3 is not.
+    height_mm = (1000.0 * rings["stem_height_m"].astype(float)).round().astype(int)
+    ordered = rings.assign(_height_mm=height_mm).sort_values(
+        ["tree_id", "_height_mm", "year"], kind="stable"
+    )
+    twice = ordered.duplicated(["tree_id", "_height_mm", "year"])
+    if twice.any():
+        row = ordered[twice].iloc[0]
+        raise InputError(
+            f"tree {row['tree_id']} has two rings of {row['year']} at {row['stem_height_m']:g} m",
+            where="rings",
+            expected="one row per tree, stem height and year",
+        )
+    by_disc = ordered.groupby(["tree_id", "_height_mm"], sort=True)
+    return [_whole_disc(disc.drop(columns="_height_mm")) for _, disc in by_disc]
+
+
+def _whole_disc(disc: pd.DataFrame) -> pd.DataFrame:
+    younger = np.flatnonzero(np.diff(disc["cambial_age"].to_numpy()) < 0)
+    disc = disc.iloc[younger[-1] + 1 if len(younger) else 0 :].set_index("year", drop=False)
+    years = range(int(disc.index[0]), int(disc.index[-1]) + 1)
+    if len(years) == len(disc):
+        return disc.fillna({"width_mm": 0.0}).reset_index(drop=True)
+    whole = disc.reindex(years)
+    whole["year"] = whole.index
+    for name in ("tree_id", "species", "stem_height_m"):
+        whole[name] = disc[name].iloc[0]
+    first_age = int(disc["cambial_age"].iloc[0])
+    whole["cambial_age"] = np.arange(first_age, first_age + len(whole))
+    return whole.fillna({"width_mm": 0.0, "eccentricity": 0.0}).reset_index(drop=True)
+
+
+def one_disc(rings: pd.DataFrame, tree_id: int, stem_height_m: float) -> pd.DataFrame:
+    """Give the disc of one tree and height (see `discs`).
+
+    Raises
+    ------
+    InputError
+        If the tree has no rings, or none at that height.
+    """
+    of_tree = rings[rings["tree_id"] == tree_id]
+    if not len(of_tree):
+        ids = rings["tree_id"]
+        has = f"one of {ids.nunique()} trees with rings, {ids.min()} to {ids.max()}"
+        raise InputError(
+            f"tree {tree_id} has no rings",
+            where="rings",
+            expected=has if len(ids) else "a table with rings",
+        )
+    heights = of_tree["stem_height_m"].astype(float)
+    here = (heights - stem_height_m).abs() < 0.0005
+    if not here.any():
+        known = ", ".join(f"{height:g}" for height in sorted(heights.round(3).unique()))
+        raise InputError(
+            f"tree {tree_id} has no rings at {stem_height_m:g} m",
+            where="rings",
+            expected=f"a height on record: {known} m",
+        )
+    return discs(of_tree[here])[0]
+
+
+def height_of(disc: pd.DataFrame) -> float:
+    """Give the height of a disc, m, without the digits that float32 adds."""
+    return round(float(disc["stem_height_m"].iloc[0]), 3)
+
+
+def assemble(radii: Sequence[Radius]) -> RingSeries:
+    """Name radii and lay them side by side. There is at least one, and none is empty."""
+    of_tree: dict[int, int] = {}
+    for radius in radii:
+        of_tree[radius.tree_id] = of_tree.get(radius.tree_id, 0) + 1
+    seen: dict[int, int] = {}
+    names = []
+    for radius in radii:
+        number = seen[radius.tree_id] = seen.get(radius.tree_id, -1) + 1
+        letter = _letters(number) if of_tree[radius.tree_id] > 1 else ""
+        names.append(f"T{radius.tree_id}{letter}")
+    ids = short_ids(names)
+    years = pd.RangeIndex(
+        min(int(r.year[0]) for r in radii), max(int(r.year[-1]) for r in radii) + 1, name="Year"
+    )
+    columns = np.full((len(years), len(radii)), np.nan)
+    for k, radius in enumerate(radii):
+        first = int(radius.year[0]) - years[0]
+        columns[first : first + len(radius.year), k] = radius.width_mm
+    rows: dict[str, list[Hashable]] = {
+        "tree_id": [r.tree_id for r in radii],
+        "species": [r.species for r in radii],
+        "stem_height_m": [r.stem_height_m for r in radii],
+        "azimuth_deg": [r.azimuth_deg for r in radii],
+        "first_year": [int(r.year[0]) for r in radii],
+        "last_year": [int(r.year[-1]) for r in radii],
+        "first_cambial_age": [r.first_cambial_age for r in radii],
+        "pith_offset": [r.first_cambial_age - 1 for r in radii],
+        "estimated_pith_offset": [r.estimated_pith_offset for r in radii],
+        "miss_mm": [r.miss_mm for r in radii],
+        "year_shift": [0] * len(radii),
+    }
+    about = pd.DataFrame(rows, index=pd.Index(ids, name="id")).astype(ABOUT)
+    return RingSeries(pd.DataFrame(columns, index=years, columns=ids), about)
+
+
+def _letters(number: int) -> str:
+    """Count A to Z, AA, AB and so on."""
+    text = ""
+    number += 1
+    while number:
+        number, letter = divmod(number - 1, 26)
+        text = chr(ord("A") + letter) + text
+    return text
