@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from forest.dendro.series import discs, height_of
+from forest.dendro.stems import stem_rings
 from forest.errors import InputError
 
 
@@ -34,12 +34,12 @@ def ages(rings: pd.DataFrame, trees: pd.DataFrame) -> pd.DataFrame:
     last = pd.DataFrame(
         [
             {
-                "tree_id": int(disc["tree_id"].iloc[-1]),
-                "stem_height_m": height_of(disc),
-                "year": int(disc["year"].iloc[-1]),
-                "age_at_height": int(disc["cambial_age"].iloc[-1]),
+                "tree_id": stem.tree_id,
+                "stem_height_m": stem.stem_height_m,
+                "year": int(stem.year[-1]),
+                "age_at_height": int(stem.cambial_age[-1]),
             }
-            for disc in discs(rings)
+            for stem in stem_rings(rings)
         ]
     )
     known = trees[["tree_id", "year", "age"]].rename(columns={"age": "age_at_seed"})

@@ -8,6 +8,7 @@ import pandas as pd
 
 from forest.dendro.cores import core
 from forest.dendro.series import RingSeries, assemble
+from forest.dendro.stems import at_height
 from forest.errors import InputError
 from forest.random import STREAM_CORE, uniforms
 
@@ -102,8 +103,7 @@ def _dominant(
         years = trees["year"]
         span = f"a year from {years.min()} to {years.max()}" if len(years) else "a run with years"
         raise InputError(f"no tree lives in {year}", where="campaign", expected=span)
-    at_height = (rings["stem_height_m"].astype(float) - stem_height_m).abs() < 0.0005
-    with_rings = rings.loc[at_height & (rings["year"] == year), "tree_id"]
+    with_rings = rings.loc[at_height(rings, stem_height_m) & (rings["year"] == year), "tree_id"]
     now = now[now["tree_id"].isin(with_rings) & now[by].notna()]
     if len(now) < n_trees:
         raise InputError(

@@ -21,7 +21,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from forest.dendro.series import Radius, height_of, one_disc
+from forest.dendro.series import Radius
+from forest.dendro.stems import StemRings, rings_at
 from forest.errors import InputError
 from forest.random import STREAM_CORE, normals
 
@@ -90,13 +91,13 @@ class Core:
         )
 
 
-def radial_widths(disc: pd.DataFrame, azimuth_deg: float) -> NDArray[np.float64]:
-    """Give the widths of a disc's rings along an azimuth, w (1 + e cos(azimuth - thick side)).
+def radial_widths(stem: StemRings, azimuth_deg: float) -> NDArray[np.float64]:
+    """Give the widths of a stem's rings along an azimuth, w (1 + e cos(azimuth - thick side)).
 
     Parameters
     ----------
-    disc : pandas.DataFrame
-        Rings of one tree and height, with `width_mm`, `eccentricity` and `thick_side_deg`.
+    stem : StemRings
+        Rings of one tree and height.
     azimuth_deg : float
         Degrees from x towards y.
 
@@ -106,18 +107,17 @@ def radial_widths(disc: pd.DataFrame, azimuth_deg: float) -> NDArray[np.float64]
         Widths in mm. A core through the pith holds these up to terms of the second order in the
         eccentricity, since its rings are circles.
     """
-    mean, shift = _mean_and_shift(disc)
+    mean, shift = _mean_and_shift(stem)
     return np.asarray(mean + shift @ _direction(math.radians(azimuth_deg)))
 
 
-def bore(disc: pd.DataFrame, azimuth_deg: float, aim_deg: float = 0.0) -> Core:
-    """Bore into a disc from an azimuth, towards the pith or past it.
+def bore(stem: StemRings, azimuth_deg: float, aim_deg: float = 0.0) -> Core:
+    """Bore into a stem from an azimuth, towards the pith or past it.
 
     Parameters
     ----------
-    disc : pandas.DataFrame
-        Rings of one tree and stem height, with the columns of `/rings`, in order of years and
-        none left out.
+    stem : StemRings
+        Rings of one tree and height.
     azimuth_deg : float
         Side on which the borer enters, degrees from x towards y.
     aim_deg : float
@@ -130,12 +130,12 @@ def bore(disc: pd.DataFrame, azimuth_deg: float, aim_deg: float = 0.0) -> Core:
         A bore within `PITH_RADIUS_MM` of the pith's centre holds all rings. One that stays
         within the last ring holds none.
     """
-    mean, shift = _mean_and_shift(disc)
+    mean, shift = _mean_and_shift(stem)
     radius = np.concatenate(([0.0], np.cumsum(mean)))
     centre = np.vstack((np.zeros(2), np.cumsum(shift, axis=0)))
     inward, aim = math.radians(azimuth_deg), math.radians(aim_deg)
     to_bark = _exit(radius[-1:], centre[-1:], _direction(inward), 0.0)[0]
-    miss = to_bark * math.sin(aim)
+    miss = float(to_bark) * math.sin(aim)
     if abs(miss) <= PITH_RADIUS_MM:
         miss = 0.0
     # Along the bore `s` counts outward from the point nearest to the pith.
@@ -145,14 +145,14 @@ def bore(disc: pd.DataFrame, azimuth_deg: float, aim_deg: float = 0.0) -> Core:
     innermost = int(np.argmax(touched)) if touched.any() else len(mean)
     s = _exit(radius[innermost:], centre[innermost:], along, -miss)
     widths = np.maximum(np.diff(s), 0.0)  # outlines that touch may cross by a rounding error
-    first_age = int(disc["cambial_age"].iloc[0]) + innermost
+    first_age = int(stem.cambial_age[0]) + innermost
     return Core(
-        tree_id=int(disc["tree_id"].iloc[0]),
-        species=str(disc["species"].iloc[0]),
-        stem_height_m=height_of(disc),
+        tree_id=stem.tree_id,
+        species=stem.species,
+        stem_height_m=stem.stem_height_m,
         azimuth_deg=azimuth_deg % 360.0,
         aim_deg=aim_deg,
-        year=disc["year"].to_numpy(np.int64)[innermost:],
+        year=stem.year[innermost:],
         width_mm=widths,
         first_cambial_age=first_age,
         pith_offset=first_age - 1,
@@ -206,20 +206,18 @@ def core(
             where="core",
             expected=f"0 to {_LARGEST_AIM_SD_DEG:g} degrees",
         )
-    disc = one_disc(rings, tree_id, stem_height_m)
+    stem = rings_at(rings, tree_id, stem_height_m)
     height_mm = round(1000.0 * stem_height_m)
     tenths = round(10.0 * azimuth_deg) % 3600
     draw, _ = normals(seed, STREAM_CORE, tree_id, height_mm, tenths)
-    return bore(disc, azimuth_deg, aim_sd_deg * min(max(float(draw), -3.0), 3.0))
+    return bore(stem, azimuth_deg, aim_sd_deg * min(max(float(draw), -3.0), 3.0))
 
 
-def _mean_and_shift(disc: pd.DataFrame) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _mean_and_shift(stem: StemRings) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Give each ring's mean width and how far its centre lies from the one before, mm."""
-    mean = disc["width_mm"].to_numpy(np.float64)
-    eccentricity = disc["eccentricity"].fillna(0.0).to_numpy(np.float64)
-    thick = np.radians(disc["thick_side_deg"].fillna(0.0).to_numpy(np.float64))
-    shift = (mean * eccentricity)[:, None] * np.column_stack((np.cos(thick), np.sin(thick)))
-    return mean, shift
+    thick = np.radians(stem.thick_side_deg)
+    towards = np.column_stack((np.cos(thick), np.sin(thick)))
+    return stem.width_mm, (stem.width_mm * stem.eccentricity)[:, None] * towards
 
 
 def _direction(azimuth: float) -> NDArray[np.float64]:

@@ -9,19 +9,7 @@ import numpy as np
 import pandas as pd
 
 from forest.dendro.names import short_ids
-from forest.errors import InputError, nearest
-
-#: What a frame of rings must hold; see `/rings` in the run file.
-RING_COLUMNS = (
-    "year",
-    "tree_id",
-    "species",
-    "stem_height_m",
-    "cambial_age",
-    "width_mm",
-    "eccentricity",
-    "thick_side_deg",
-)
+from forest.dendro.stems import stem_rings
 
 #: What `RingSeries.about` holds, with its dtypes.
 ABOUT = {
@@ -113,99 +101,16 @@ def ring_series(rings: pd.DataFrame) -> RingSeries:
     return assemble(
         [
             Radius(
-                tree_id=int(disc["tree_id"].iloc[0]),
-                species=str(disc["species"].iloc[0]),
-                stem_height_m=height_of(disc),
-                year=disc["year"].to_numpy(),
-                width_mm=disc["width_mm"].to_numpy(),
-                first_cambial_age=int(disc["cambial_age"].iloc[0]),
+                tree_id=stem.tree_id,
+                species=stem.species,
+                stem_height_m=stem.stem_height_m,
+                year=stem.year,
+                width_mm=stem.width_mm,
+                first_cambial_age=int(stem.cambial_age[0]),
             )
-            for disc in discs(rings)
+            for stem in stem_rings(rings)
         ]
     )
-
-
-def discs(rings: pd.DataFrame) -> list[pd.DataFrame]:
-    """Cut a ring frame into discs: a frame per tree and height, a row per year, no year left out.
-
-    A year without a row between two others is a missing ring: its width is 0. A stem that
-    broke below the height and grew anew has a new pith there; the disc is of the new stem alone.
-
-    Raises
-    ------
-    InputError
-        If a column is lacking, there are no rings, or a ring stands there twice.
-    """
-    for name in RING_COLUMNS:
-        if name not in rings.columns:
-            hint = nearest(name, map(str, rings.columns)) if len(rings.columns) else ""
-            raise InputError(f"no column '{name}'", where="rings", expected=hint)
-    if not len(rings):
-        raise InputError("no rings", where="rings", expected="at least one row")
-    # In mm: heights are float32 in the file, and 1.3 is not.
-    height_mm = (1000.0 * rings["stem_height_m"].astype(float)).round().astype(int)
-    ordered = rings.assign(_height_mm=height_mm).sort_values(
-        ["tree_id", "_height_mm", "year"], kind="stable"
-    )
-    twice = ordered.duplicated(["tree_id", "_height_mm", "year"])
-    if twice.any():
-        row = ordered[twice].iloc[0]
-        raise InputError(
-            f"tree {row['tree_id']} has two rings of {row['year']} at {row['stem_height_m']:g} m",
-            where="rings",
-            expected="one row per tree, stem height and year",
-        )
-    by_disc = ordered.groupby(["tree_id", "_height_mm"], sort=True)
-    return [_whole_disc(disc.drop(columns="_height_mm")) for _, disc in by_disc]
-
-
-def _whole_disc(disc: pd.DataFrame) -> pd.DataFrame:
-    younger = np.flatnonzero(np.diff(disc["cambial_age"].to_numpy()) < 0)
-    disc = disc.iloc[younger[-1] + 1 if len(younger) else 0 :].set_index("year", drop=False)
-    years = range(int(disc.index[0]), int(disc.index[-1]) + 1)
-    if len(years) == len(disc):
-        return disc.fillna({"width_mm": 0.0}).reset_index(drop=True)
-    whole = disc.reindex(years)
-    whole["year"] = whole.index
-    for name in ("tree_id", "species", "stem_height_m"):
-        whole[name] = disc[name].iloc[0]
-    first_age = int(disc["cambial_age"].iloc[0])
-    whole["cambial_age"] = np.arange(first_age, first_age + len(whole))
-    return whole.fillna({"width_mm": 0.0, "eccentricity": 0.0}).reset_index(drop=True)
-
-
-def one_disc(rings: pd.DataFrame, tree_id: int, stem_height_m: float) -> pd.DataFrame:
-    """Give the disc of one tree and height (see `discs`).
-
-    Raises
-    ------
-    InputError
-        If the tree has no rings, or none at that height.
-    """
-    of_tree = rings[rings["tree_id"] == tree_id]
-    if not len(of_tree):
-        ids = rings["tree_id"]
-        has = f"one of {ids.nunique()} trees with rings, {ids.min()} to {ids.max()}"
-        raise InputError(
-            f"tree {tree_id} has no rings",
-            where="rings",
-            expected=has if len(ids) else "a table with rings",
-        )
-    heights = of_tree["stem_height_m"].astype(float)
-    here = (heights - stem_height_m).abs() < 0.0005
-    if not here.any():
-        known = ", ".join(f"{height:g}" for height in sorted(heights.round(3).unique()))
-        raise InputError(
-            f"tree {tree_id} has no rings at {stem_height_m:g} m",
-            where="rings",
-            expected=f"a height on record: {known} m",
-        )
-    return discs(of_tree[here])[0]
-
-
-def height_of(disc: pd.DataFrame) -> float:
-    """Give the height of a disc, m, without the digits that float32 adds."""
-    return round(float(disc["stem_height_m"].iloc[0]), 3)
 
 
 def assemble(radii: Sequence[Radius]) -> RingSeries:

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from forest.dendro.names import MAX_LENGTH
-from forest.dendro.writing import check_widths, read_text, write_text
+from forest.dendro.writing import check_widths, in_thousandths, read_text, write_text
 from forest.errors import InputError
 
 _STOP = -9999  # of series in 0.001 mm, which we write
@@ -89,7 +89,7 @@ def _series_lines(name: str, first_year: int, widths_mm: np.ndarray) -> list[str
             where="widths",
             expected=f"at most {MAX_LENGTH} letters and digits (see short_ids)",
         )
-    numbers = np.rint(1000.0 * widths_mm).astype(np.int64)
+    numbers = in_thousandths(widths_mm).astype(np.int64)
     if numbers.max() > _WIDEST:
         year = first_year + int(numbers.argmax())
         raise InputError(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from forest.dendro.writing import check_widths, read_text, write_text
+from forest.dendro.writing import check_widths, in_thousandths, read_text, write_text
 from forest.errors import InputError
 
 
@@ -46,7 +46,9 @@ def write_csv(
         If it cannot be written.
     """
     check_widths(widths, present_year)
-    text = widths.to_csv(index_label="Year", na_rep="NA", float_format="%.3f", lineterminator="\n")
+    rounded = widths.copy()
+    rounded[:] = in_thousandths(widths.to_numpy(dtype=float)) / 1000.0
+    text = rounded.to_csv(index_label="Year", na_rep="NA", float_format="%.3f", lineterminator="\n")
     return write_text(Path(path), text, overwrite=overwrite)
 
 

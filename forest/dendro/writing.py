@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from forest.errors import InputError, OutputError
 
@@ -72,6 +73,11 @@ def _check_column(name: str, years: np.ndarray, column: np.ndarray) -> None:
             where="widths",
             expected="a width; 0 for a missing ring",
         )
+
+
+def in_thousandths(widths_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Round widths in mm to whole thousandths, in the same way for every file; NaN stays."""
+    return np.asarray(np.rint(1000.0 * widths_mm), np.float64)
 
 
 def write_text(path: Path, text: str, *, overwrite: bool) -> Path:
