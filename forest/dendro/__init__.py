@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from forest.dendro.ages import ages
 from forest.dendro.campaign import campaign
-from forest.dendro.cores import Core, bore, core
+from forest.dendro.cores import Core, bore, core, radial_widths
 from forest.dendro.crossdating import interseries_correlation
 from forest.dendro.names import short_ids
 from forest.dendro.series import RingSeries, ring_series
@@ -19,6 +19,7 @@ __all__ = [
     "campaign",
     "core",
     "interseries_correlation",
+    "radial_widths",
     "read_csv",
     "read_rwl",
     "ring_series",

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from forest.dendro import bore, core
-from forest.dendro.cores import radial_widths
+from forest.dendro import bore, core, radial_widths
 from forest.dendro.stems import StemRings, stem_rings
 from forest.errors import InputError
 from tests.reference.cores import walk
