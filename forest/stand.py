@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import remember_breast
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
+from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.record.schema import CAUSES
 from forest.trees import table
 from forest.trees.metamers import Arena
@@ -65,10 +66,18 @@ class Stand:
         self.species = scenario.species_list
         self.species_names = [s.name for s in self.species]
         self._paper = scenario.mode == "paper"
-        self._traits = species_traits(self.species, paper=self._paper)
+        self._traits = species_traits(
+            self.species,
+            paper=self._paper,
+            bending=scenario.mechanics is not None and scenario.mechanics.bending,
+        )
         self._measures_of = _measure_species(self)
         self._surroundings = Surroundings(scenario, self.pipe_exponent)
-        self.arena = Arena()
+        self.mechanics: Mechanics | None = None
+        if scenario.mechanics is not None:
+            spec = MechanicsSpec(**scenario.mechanics.model_dump())
+            self.mechanics = Mechanics(spec, self.species, self.pipe_exponent)
+        self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
         self._step = 0
@@ -94,6 +103,7 @@ class Stand:
         self._shed(shared)
         shared = self._extend(year)
         self._thicken(shared, year, accounts)
+        self._bend()
         measures, dead = self._die()
         record = record_year(self, measures, dead, accounts, before)
         self._bury(dead, measures)
@@ -121,7 +131,7 @@ class Stand:
 
     def _shed(self, shared: Deal) -> None:
         shed(
-            self.arena.metamers,
+            self.arena,
             self.rows,
             shared,
             self._bench.scratch(shared),
@@ -162,6 +172,11 @@ class Stand:
             accounts,
         )
         self._lap("thicken")
+
+    def _bend(self) -> None:
+        if self.mechanics is not None:
+            self.mechanics.bend(self.arena, self.rows, self._step)
+            self._lap("bend")
 
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
         """Measure all trees; name the rows of those that die, with the cause."""
@@ -318,7 +333,7 @@ class Stand:
         measures = self.measure()
         kind = int(self.rows.species[row])
         branch_pipe = float(self._traits.of["branch_pipe"][kind])
-        gone = cut_branch(self.arena.metamers, self.rows, row, metamer, branch_pipe)
+        gone = cut_branch(self.arena, self.rows, row, metamer, branch_pipe)
         self._pending.append(Event.of(self, row, "pruned", "none", measures))
         return gone
 
@@ -366,23 +381,35 @@ class Stand:
             "y_m": self.rows.y,
             "age": self._step - self.rows.birth,
         }
-        hidden = ("breast_serial", "breast_birth", "breast_radius_m")
-        columns.update({k: v for k, v in measures._asdict().items() if k not in hidden})
+        columns.update(measures.columns())
         return pd.DataFrame(columns)
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""
         return measure_trees(self.arena.metamers, self.rows, self._measures_of, self._full_light)
 
-    def skeleton(self, tree_id: int) -> Skeleton:
-        """The shape of a living tree."""
+    def skeleton(self, tree_id: int, season: Literal["summer", "winter"] = "summer") -> Skeleton:
+        """The shape of a living tree.
+
+        Parameters
+        ----------
+        tree_id : int
+            A living tree.
+        season : {"summer", "winter"}
+            Where trees bend: under its load of leaves and fruit, or as it springs up without
+            (Taylor-Hell 2005, 6.3).
+        """
         from forest.trees.skeleton import skeleton_of
 
         row = self.row_of(tree_id)
         kind = int(self.rows.species[row])
+        metamers, rows = self.arena.metamers, self.rows
+        if season == "winter" and self.mechanics is not None:
+            metamers, rows = self.mechanics.winter(self.arena, self.rows, row)
+            row = 0
         return skeleton_of(
-            self.arena.metamers,
-            self.rows,
+            metamers,
+            rows,
             row,
             species=self.species_names[kind],
             pipe_exponent=float(self.pipe_exponent[kind]),
@@ -418,9 +445,9 @@ class Stand:
         spans = [
             (int(s), int(s) + int(n)) for s, n in zip(self.rows.start, self.rows.size, strict=True)
         ]
-        for name, field in self.arena.metamers._asdict().items():
+        for name, field in self._metamer_fields():
             parts = [field[a:b] for a, b in spans]
-            arrays[f"metamer_{name}"] = np.concatenate(parts) if parts else field[:0]
+            arrays[name] = np.concatenate(parts) if parts else field[:0]
         arrays.update(self._surroundings.state())
         meta = {
             "step": self._step,
@@ -431,6 +458,15 @@ class Stand:
             ],
         }
         return arrays, meta
+
+    def _metamer_fields(self) -> list[tuple[str, NDArray[Any]]]:
+        """Name the arrays of the arena as checkpoints do."""
+        groups = {"metamer": self.arena.metamers, "companion": self.arena.companions}
+        return [
+            (f"{group}_{name}", field)
+            for group, fields in groups.items()
+            for name, field in zip(getattr(fields, "_fields", ()), fields, strict=True)
+        ]
 
     @classmethod
     def restore(
@@ -457,8 +493,8 @@ class Stand:
         at = 0
         for row, n in enumerate(size):
             s = int(rows.start[row])
-            for name, field in stand.arena.metamers._asdict().items():
-                field[s : s + n] = arrays[f"metamer_{name}"][at : at + n]
+            for name, field in stand._metamer_fields():
+                field[s : s + n] = arrays[name][at : at + n]
             at += int(n)
         rows.size[:] = size
         stand._surroundings.restore(arrays)
