@@ -20,7 +20,7 @@ from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds, sprout
-from forest.measure.rings import remember_breast
+from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.record.schema import CAUSES
@@ -82,6 +82,8 @@ class Stand:
             paper=self._paper,
             bending=scenario.mechanics is not None and scenario.mechanics.bending,
         )
+        self._ring_heights = np.array(scenario.output.ring_heights_m, np.float64)
+        self._pipes_before = np.empty(0, np.float32)
         self._measures_of = MeasureSpecies.of(self.species, self.pipe_exponent)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.mechanics: Mechanics | None = None
@@ -113,10 +115,11 @@ class Stand:
         self._allocate(shared, year, accounts)
         self._shed(shared)
         shared = self._extend(year)
+        rings = self._note_pipes()
         self._thicken(shared, year, accounts)
         self._bend()
         measures, dead = self._die()
-        record = record_year(self, measures, dead, accounts, before)
+        record = record_year(self, measures, dead, accounts, before, rings)
         self._bury(dead, measures)
         self._lap("record")
         return record
@@ -172,6 +175,14 @@ class Stand:
         self._lap("extend")
         return deal(rows.size)
 
+    def _note_pipes(self) -> RingYear:
+        """Keep how thick everything is before it thickens."""
+        if len(self._pipes_before) != self.arena.capacity:
+            self._pipes_before = np.empty(self.arena.capacity, np.float32)
+        used = self.arena.used
+        self._pipes_before[:used] = self.arena.metamers.pipe[:used]
+        return RingYear(self.year, self.steps, self._pipes_before, self.pipe_exponent)
+
     def _thicken(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
         thicken(
             self.arena.metamers,
@@ -192,7 +203,11 @@ class Stand:
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
         """Measure all trees; name the rows of those that die, with the cause."""
         measures = measure_trees(
-            self.arena.metamers, self.rows, self._measures_of, self._full_light
+            self.arena.metamers,
+            self.rows,
+            self._measures_of,
+            self._full_light,
+            self._ring_heights,
         )
         dead: list[tuple[int, str]] = []
         if not self._paper:
@@ -204,7 +219,7 @@ class Stand:
         return measures, dead
 
     def _bury(self, dead: list[tuple[int, str]], measures: TreeMeasures) -> None:
-        remember_breast(self.rows, measures)
+        remember_discs(self.rows, self.arena.metamers, measures)
         self.pending = []
         if dead:
             alive = np.ones(len(self.rows.tree_id), np.bool_)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.growth import budget
-from forest.measure.rings import ring_rows, ring_widths
+from forest.measure.rings import RingYear, breast_ring_widths, ring_rows
 from forest.measure.stand import Flows, Plot, stand_rows
 from forest.measure.trees import TreeMeasures
 from forest.record.samples import SampleShape, SampleYear
@@ -75,6 +75,7 @@ def record_year(
     dead: list[tuple[int, str]],
     accounts: NDArray[np.float64],
     serials_before: dict[int, NDArray[np.int32]],
+    rings: RingYear,
 ) -> YearRecord:
     """Write down the year that has just been grown.
 
@@ -90,6 +91,8 @@ def record_year(
         The year's carbon accounts, kg per tree.
     serials_before : dict
         Serials of the sample trees' metamers before the year.
+    rings : RingYear
+        What the year's rings are read from.
     """
     rows = stand.rows
     alive = np.ones(len(rows.tree_id), np.bool_)
@@ -105,7 +108,7 @@ def record_year(
     stand.sample_ids.extend(chosen)
     plot = stand.scenario.plot
     tables = {
-        "trees": _tree_rows(stand, living, of_living),
+        "trees": _tree_rows(stand, living, of_living, rings),
         "stand": stand_rows(
             stand.year,
             of_living,
@@ -117,9 +120,7 @@ def record_year(
             stand.floor_light,
         ),
         "events": _event_rows(stand.year, events),
-        "rings": ring_rows(
-            stand.year, stand.steps, living, of_living, *_thick_sides(stand, living, of_living)
-        ),
+        "rings": _ring_rows(stand, living, of_living, rings),
         "carbon": _carbon_rows(stand, accounts),
     }
     if stand.mechanics is not None:
@@ -127,7 +128,9 @@ def record_year(
     return YearRecord(stand.year, tables, _sample_years(stand, dead, serials_before))
 
 
-def _tree_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Columns:
+def _tree_rows(
+    stand: Stand, trees: table.Trees, measures: TreeMeasures, rings: RingYear
+) -> Columns:
     n = len(trees.tree_id)
     columns: Columns = {
         "year": np.full(n, stand.year, np.int32),
@@ -137,21 +140,28 @@ def _tree_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Colu
         "y_m": trees.y,
         "age": stand.steps - trees.birth,
         "status": np.zeros(n, np.int8),
-        "ring_width_mm": ring_widths(trees, measures),
+        "ring_width_mm": breast_ring_widths(stand.arena.metamers, trees, measures, rings),
     }
     columns.update(measures.columns())
     return columns
 
 
-def _thick_sides(
-    stand: Stand, trees: table.Trees, measures: TreeMeasures
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | tuple[None, None]:
-    """Give eccentricity and thick side (degrees) of the rings at breast height."""
+def _ring_rows(
+    stand: Stand, trees: table.Trees, measures: TreeMeasures, rings: RingYear
+) -> Columns:
+    output = stand.scenario.output
+    heights = np.array(output.ring_heights_m, np.float64)
+    metamers = stand.arena.metamers
+    columns = ring_rows(metamers, trees, measures, heights, output.ring_crown_base, rings)
+    if not columns:
+        return {}
+    place = columns.pop("metamer")
     if stand.mechanics is None:
-        return None, None
-    place = trees.start + np.maximum(measures.breast_metamer, 0)
+        round_, no_side = np.zeros(len(place)), np.full(len(place), np.nan)
+        return {**columns, "eccentricity": round_, "thick_side_deg": no_side}
     eccentricity, azimuth = stand.mechanics.thick_sides(stand.arena, place)
-    return eccentricity, np.degrees(azimuth) % 360.0
+    side = np.degrees(azimuth) % 360.0
+    return {**columns, "eccentricity": eccentricity, "thick_side_deg": side}
 
 
 def _stability_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Columns:

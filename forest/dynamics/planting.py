@@ -53,6 +53,7 @@ def seedlings(
     trees.y[:] = y
     trees.birth[:] = step
     trees.breast_serial[:] = -1
+    trees.disc_serial[:] = -1
     for axis, place in enumerate((x, y)):
         voxel = np.floor(np.asarray(place) / voxel_m)
         trees.base_voxel[:, axis] = voxel

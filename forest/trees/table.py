@@ -7,6 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+#: Heights at which rings can be told.
+DISCS = 8
+
 #: Columns of the table: name -> (dtype, items, meaning).
 COLUMNS: dict[str, tuple[type, int, str]] = {
     "tree_id": (np.int32, 1, "number of the tree, from 1, never used twice"),
@@ -25,7 +28,7 @@ COLUMNS: dict[str, tuple[type, int, str]] = {
     "reserve": (np.float64, 1, "stored dry mass, kg"),
     "bad_years": (np.int32, 1, "years in a row of a net income below the limit"),
     "breast_serial": (np.int32, 1, "serial of the metamer at 1.3 m; -1 while there is none"),
-    "breast_radius": (np.float32, 1, "radius under bark there at the end of last year, m"),
+    "disc_serial": (np.int32, DISCS, "serials of the metamers whose rings are told; -1 for none"),
 }
 
 
@@ -48,7 +51,7 @@ class Trees(NamedTuple):
     reserve: NDArray[np.float64]
     bad_years: NDArray[np.int32]
     breast_serial: NDArray[np.int32]
-    breast_radius: NDArray[np.float32]
+    disc_serial: NDArray[np.int32]
 
 
 def empty(n: int = 0) -> Trees:
