@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.dynamics.planting import seedlings
+from forest.dynamics.acts import YearOfActs, acts_of
+from forest.dynamics.planting import check_planting, seedlings
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
 from forest.errors import InputError, nearest
@@ -23,10 +24,12 @@ from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import remember_breast
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.record.schema import CAUSES
+from forest.scenario.acts import Branches
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.trees.pruning import cut_branch
-from forest.yearbook import Event, YearRecord, record_year
+from forest.trees.packing import pack, unpack
+from forest.trees.pruning import choose_branches, cut_branches, find_cuts
+from forest.yearbook import Event, Loss, YearRecord, record_year
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,6 +62,7 @@ class Stand:
         self._start(scenario)
         x, y, species = scenario.planting_positions()
         self._plant(x, y, species)
+        self._due_acts()  # those of the first year are refused before it
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -74,15 +78,23 @@ class Stand:
         self._step = 0
         self._next_id = 1
         self._pending: list[Event] = []
+        self._losses: dict[int, Loss] = {}
         self.sample_ids: list[int] = []
         self.seconds: dict[str, float] = {}
 
     # ------------------------------------------------------------------ the year
 
     def step(self) -> YearRecord:
-        """Grow for one year and give its record."""
-        self._step += 1
+        """Do the scenario's acts of the next year, grow for that year and give its record.
+
+        Raises
+        ------
+        ActError
+            If an act cannot be done; then the stand is as it was.
+        """
         self._clock = time.perf_counter()
+        self._act()
+        self._step += 1
         year = self._year()
         accounts = np.zeros((len(self.rows.tree_id), budget.ACCOUNTS))
         shared = deal(self.rows.size)
@@ -180,6 +192,7 @@ class Stand:
     def _bury(self, dead: list[tuple[int, str]], measures: TreeMeasures) -> None:
         remember_breast(self.rows, measures)
         self._pending = []
+        self._losses = {}
         if dead:
             alive = np.ones(len(self.rows.tree_id), np.bool_)
             alive[[row for row, _ in dead]] = False
@@ -209,6 +222,20 @@ class Stand:
 
     # ------------------------------------------------------------------ acts between years
 
+    def _due_acts(self) -> YearOfActs:
+        """Find out what the scenario's acts of the next year do."""
+        acts, year = self.scenario.acts, self.year + 1
+        return acts_of(acts, year, self.arena.metamers, self.rows, self.species_names)
+
+    def _act(self) -> None:
+        due = self._due_acts()
+        self._cut(due.cuts)
+        for tree_ids, cause in due.fellings:
+            self.fell(tree_ids, cause)
+        for x, y, names in due.plantings:
+            self.plant(x, y, names)
+        self._lap("act")
+
     def plant(
         self, x: Sequence[float], y: Sequence[float], species: str | Sequence[str]
     ) -> list[int]:
@@ -227,34 +254,13 @@ class Stand:
             The new trees' ids.
         """
         names = [species] * len(x) if isinstance(species, str) else list(species)
-        if not len(x) == len(y) == len(names):
-            raise InputError(
-                f"{len(x)} x, {len(y)} y and {len(names)} species",
-                where="Stand.plant",
-                expected="as many of each",
-            )
-        known = {name: k for k, name in enumerate(self.species_names)}
-        for name in names:
-            if name not in known:
-                raise InputError(
-                    f"species '{name}' is not in this stand",
-                    where="Stand.plant",
-                    expected="one of " + ", ".join(known),
-                )
         at = np.asarray(x, np.float64), np.asarray(y, np.float64)
         width, depth = self.scenario.plot.size_m
-        inside = (at[0] >= 0) & (at[0] <= width) & (at[1] >= 0) & (at[1] <= depth)
-        if not inside.all():
-            k = int(np.flatnonzero(~inside)[0])
-            raise InputError(
-                f"({at[0][k]}, {at[1][k]}) is outside the plot",
-                where="Stand.plant",
-                expected=f"0 to {width} and 0 to {depth} m",
-            )
+        check_planting(*at, names, (width, depth), self.species_names)
         if self.scenario.plot.boundary == "periodic":
             at = at[0] % width, at[1] % depth
         first = self._next_id
-        self._plant(*at, np.array([known[name] for name in names], np.int16))
+        self._plant(*at, np.array([self.species_names.index(name) for name in names], np.int16))
         return list(range(first, self._next_id))
 
     def _plant(self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]) -> None:
@@ -306,21 +312,67 @@ class Stand:
         for row in rows:
             if alive[row]:
                 self._pending.append(Event.of(self, row, "felled", cause, measures))
+                self._note_loss(row, self._serials(row))
             alive[row] = False
         self.rows = table.keep(self.rows, alive)
 
-    def prune(self, tree_id: int, metamer: int) -> int:
-        """Cut a tree above the foot of a metamer, named by its serial number.
+    def prune(
+        self, tree_id: int, metamer: int | Sequence[int] | None = None, **branches: float
+    ) -> int:
+        """Cut parts off a tree: at metamers, or the branches on its trunk that a choice names.
 
-        Returns the number of metamers that go. Cutting the first metamer is refused: fell the tree.
+        Parameters
+        ----------
+        tree_id : int
+            A living tree.
+        metamer : int or sequence of int, optional
+            Serial numbers of metamers: each goes with all that it carries.
+        **branches : float
+            In place of metamers, as in a scenario's acts: `below_m`, the height below which
+            branches go, m; or `side_deg`, the side to which those point that go, with or without
+            `within_deg`, `from_m`, `to_m`. See `forest.scenario.acts.Branches`.
+
+        Returns
+        -------
+        int
+            Metamers removed.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree or metamer, or if the first metamer is to go: fell the tree.
         """
-        row = self.row_of(tree_id)
+        row, arena = self.row_of(tree_id), self.arena.metamers
+        if metamer is None:
+            choice = Branches.of("Stand.prune", **branches)
+            return self._cut({tree_id: choose_branches(arena, self.rows, row, choice)})
+        if branches:
+            raise InputError(f"metamer and {min(branches)} exclude each other", where="Stand.prune")
+        find_cuts(arena, self.rows, row, metamer, where="Stand.prune")
+        return self._cut({tree_id: np.atleast_1d(metamer)})
+
+    def _cut(self, cuts: Mapping[int, NDArray[Any]]) -> int:
+        """Cut trees at metamers that are there; give the number of those that go."""
+        cuts = {tree_id: serials for tree_id, serials in cuts.items() if len(serials)}
+        if not cuts:
+            return 0
         measures = self.measure()
-        kind = int(self.rows.species[row])
-        branch_pipe = float(self._traits.of["branch_pipe"][kind])
-        gone = cut_branch(self.arena.metamers, self.rows, row, metamer, branch_pipe)
-        self._pending.append(Event.of(self, row, "pruned", "none", measures))
-        return gone
+        removed = 0
+        for tree_id, serials in cuts.items():
+            row = self.row_of(tree_id)
+            branch_pipe = float(self._traits.of["branch_pipe"][self.rows.species[row]])
+            gone = cut_branches(self.arena.metamers, self.rows, row, serials, branch_pipe)
+            self._pending.append(Event.of(self, row, "pruned", "none", measures))
+            self._note_loss(row, gone)
+            removed += len(gone)
+        return removed
+
+    def _note_loss(self, row: int, serials: NDArray[np.int32]) -> None:
+        """Keep what a sample tree loses, for the year's record."""
+        rows, tree_id = self.rows, int(self.rows.tree_id[row])
+        if tree_id in self.sample_ids:
+            new = Loss(int(rows.species[row]), float(rows.x[row]), float(rows.y[row]), [])
+            self._losses.setdefault(tree_id, new).serials.extend(serials.tolist())
 
     # ------------------------------------------------------------------ what it is now
 
@@ -338,6 +390,11 @@ class Stand:
     def pending(self) -> list[Event]:
         """Events since the last record."""
         return self._pending
+
+    @property
+    def losses(self) -> dict[int, Loss]:
+        """What acts took from sample trees since the last record, by tree id."""
+        return self._losses
 
     @property
     def floor_light(self) -> float:
@@ -391,37 +448,22 @@ class Stand:
 
     def row_of(self, tree_id: int) -> int:
         """Find the row of a living tree."""
-        row = int(np.searchsorted(self.rows.tree_id, tree_id))
-        if row == len(self.rows.tree_id) or self.rows.tree_id[row] != tree_id:
-            raise InputError(
-                f"no living tree has the id {tree_id}",
-                where="Stand",
-                expected=f"one of the {len(self.rows.tree_id)} ids in stand.trees.tree_id",
-            )
-        return row
+        return table.row_of(self.rows, tree_id, where="Stand")
+
+    def _serials(self, row: int) -> NDArray[np.int32]:
+        start, size = int(self.rows.start[row]), int(self.rows.size[row])
+        return self.arena.metamers.serial[start : start + size].copy()
 
     def _sample_serials(self) -> dict[int, NDArray[np.int32]]:
         """Serials of the sample trees' metamers before the year, to tell what was shed."""
-        serials = {}
-        for tree_id in self.sample_ids:
-            row = int(np.searchsorted(self.rows.tree_id, tree_id))
-            if row < len(self.rows.tree_id) and self.rows.tree_id[row] == tree_id:
-                start, size = int(self.rows.start[row]), int(self.rows.size[row])
-                serials[tree_id] = self.arena.metamers.serial[start : start + size].copy()
-        return serials
+        rows = np.flatnonzero(np.isin(self.rows.tree_id, self.sample_ids))
+        return {int(self.rows.tree_id[row]): self._serials(row) for row in rows}
 
     # ------------------------------------------------------------------ checkpoints
 
     def state(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Everything that the next year needs: arrays, and a few numbers (JSON)."""
-        arrays = {f"tree_{name}": column for name, column in self.rows._asdict().items()}
-        spans = [
-            (int(s), int(s) + int(n)) for s, n in zip(self.rows.start, self.rows.size, strict=True)
-        ]
-        for name, field in self.arena.metamers._asdict().items():
-            parts = [field[a:b] for a, b in spans]
-            arrays[f"metamer_{name}"] = np.concatenate(parts) if parts else field[:0]
-        arrays.update(self._surroundings.state())
+        arrays = pack(self.arena.metamers, self.rows) | self._surroundings.state()
         meta = {
             "step": self._step,
             "next_id": self._next_id,
@@ -429,6 +471,7 @@ class Stand:
             "pending": [
                 [None if value != value else value for value in event] for event in self._pending
             ],
+            "losses": {str(tree_id): list(loss) for tree_id, loss in self._losses.items()},
         }
         return arrays, meta
 
@@ -446,21 +489,8 @@ class Stand:
             Event._make(np.nan if value is None else value for value in event)
             for event in meta["pending"]
         ]
-        stand.rows = table.Trees(
-            **{name: np.array(arrays[f"tree_{name}"]) for name in table.Trees._fields}
-        )
-        rows = stand.rows
-        size = rows.size.copy()
-        rows.size[:] = 0
-        rows.room[:] = 0
-        stand.arena.make_room(rows.start, rows.size, rows.room, size.astype(np.int64))
-        at = 0
-        for row, n in enumerate(size):
-            s = int(rows.start[row])
-            for name, field in stand.arena.metamers._asdict().items():
-                field[s : s + n] = arrays[f"metamer_{name}"][at : at + n]
-            at += int(n)
-        rows.size[:] = size
+        stand._losses = {int(i): Loss._make(loss) for i, loss in meta["losses"].items()}
+        stand.rows = unpack(arrays, stand.arena)
         stand._surroundings.restore(arrays)
         return stand
 
