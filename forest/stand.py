@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.dynamics.acts import YearOfActs, acts_of
+from forest import management
 from forest.dynamics.planting import check_planting, seedlings
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
-from forest.errors import InputError, nearest
 from forest.growth import budget
 from forest.growth.allocate import allocate
 from forest.growth.dealing import Deal, Workbench, deal
@@ -23,12 +22,10 @@ from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import remember_breast
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
-from forest.record.schema import CAUSES
-from forest.scenario.acts import Branches
+from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.trees import table
 from forest.trees.metamers import Arena
 from forest.trees.packing import pack, unpack
-from forest.trees.pruning import choose_branches, cut_branches, find_cuts
 from forest.yearbook import Event, Loss, YearRecord, record_year
 
 if TYPE_CHECKING:
@@ -62,7 +59,7 @@ class Stand:
         self._start(scenario)
         x, y, species = scenario.planting_positions()
         self._plant(x, y, species)
-        self._due_acts()  # those of the first year are refused before it
+        management.check_due(self)  # what cannot be done in the first year is refused before it
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -72,7 +69,11 @@ class Stand:
         self._traits = species_traits(self.species, paper=self._paper)
         self._measures_of = _measure_species(self)
         self._surroundings = Surroundings(scenario, self.pipe_exponent)
-        self.arena = Arena()
+        self.mechanics: Mechanics | None = None
+        if scenario.mechanics is not None:
+            spec = MechanicsSpec(**scenario.mechanics.model_dump())
+            self.mechanics = Mechanics(spec, self.species, self.pipe_exponent)
+        self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
         self._step = 0
@@ -93,7 +94,8 @@ class Stand:
             If an act cannot be done; then the stand is as it was.
         """
         self._clock = time.perf_counter()
-        self._act()
+        management.act(self, self._traits.of["branch_pipe"])
+        self._lap("act")
         self._step += 1
         year = self._year()
         accounts = np.zeros((len(self.rows.tree_id), budget.ACCOUNTS))
@@ -106,6 +108,7 @@ class Stand:
         self._shed(shared)
         shared = self._extend(year)
         self._thicken(shared, year, accounts)
+        self._bend()
         measures, dead = self._die()
         record = record_year(self, measures, dead, accounts, before)
         self._bury(dead, measures)
@@ -133,7 +136,7 @@ class Stand:
 
     def _shed(self, shared: Deal) -> None:
         shed(
-            self.arena.metamers,
+            self.arena,
             self.rows,
             shared,
             self._bench.scratch(shared),
@@ -174,6 +177,11 @@ class Stand:
             accounts,
         )
         self._lap("thicken")
+
+    def _bend(self) -> None:
+        if self.mechanics is not None:
+            self.mechanics.bend(self.arena, self.rows, self._step)
+            self._lap("bend")
 
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
         """Measure all trees; name the rows of those that die, with the cause."""
@@ -221,20 +229,6 @@ class Stand:
         self._clock = now
 
     # ------------------------------------------------------------------ acts between years
-
-    def _due_acts(self) -> YearOfActs:
-        """Find out what the scenario's acts of the next year do."""
-        acts, year = self.scenario.acts, self.year + 1
-        return acts_of(acts, year, self.arena.metamers, self.rows, self.species_names)
-
-    def _act(self) -> None:
-        due = self._due_acts()
-        self._cut(due.cuts)
-        for tree_ids, cause in due.fellings:
-            self.fell(tree_ids, cause)
-        for x, y, names in due.plantings:
-            self.plant(x, y, names)
-        self._lap("act")
 
     def plant(
         self, x: Sequence[float], y: Sequence[float], species: str | Sequence[str]
@@ -302,19 +296,7 @@ class Stand:
         InputError
             If there is no such tree or cause; then none is felled.
         """
-        if cause not in CAUSES:
-            raise InputError(
-                f"unknown cause '{cause}', {nearest(cause, CAUSES)}", where="Stand.fell"
-            )
-        rows = [self.row_of(tree_id) for tree_id in tree_ids]
-        measures = self.measure()
-        alive = np.ones(len(self.rows.tree_id), np.bool_)
-        for row in rows:
-            if alive[row]:
-                self._pending.append(Event.of(self, row, "felled", cause, measures))
-                self._note_loss(row, self._serials(row))
-            alive[row] = False
-        self.rows = table.keep(self.rows, alive)
+        management.fell(self, tree_ids, cause)
 
     def prune(
         self, tree_id: int, metamer: int | Sequence[int] | None = None, **branches: float
@@ -342,37 +324,8 @@ class Stand:
         InputError
             If there is no such tree or metamer, or if the first metamer is to go: fell the tree.
         """
-        row, arena = self.row_of(tree_id), self.arena.metamers
-        if metamer is None:
-            choice = Branches.of("Stand.prune", **branches)
-            return self._cut({tree_id: choose_branches(arena, self.rows, row, choice)})
-        if branches:
-            raise InputError(f"metamer and {min(branches)} exclude each other", where="Stand.prune")
-        find_cuts(arena, self.rows, row, metamer, where="Stand.prune")
-        return self._cut({tree_id: np.atleast_1d(metamer)})
-
-    def _cut(self, cuts: Mapping[int, NDArray[Any]]) -> int:
-        """Cut trees at metamers that are there; give the number of those that go."""
-        cuts = {tree_id: serials for tree_id, serials in cuts.items() if len(serials)}
-        if not cuts:
-            return 0
-        measures = self.measure()
-        removed = 0
-        for tree_id, serials in cuts.items():
-            row = self.row_of(tree_id)
-            branch_pipe = float(self._traits.of["branch_pipe"][self.rows.species[row]])
-            gone = cut_branches(self.arena.metamers, self.rows, row, serials, branch_pipe)
-            self._pending.append(Event.of(self, row, "pruned", "none", measures))
-            self._note_loss(row, gone)
-            removed += len(gone)
-        return removed
-
-    def _note_loss(self, row: int, serials: NDArray[np.int32]) -> None:
-        """Keep what a sample tree loses, for the year's record."""
-        rows, tree_id = self.rows, int(self.rows.tree_id[row])
-        if tree_id in self.sample_ids:
-            new = Loss(int(rows.species[row]), float(rows.x[row]), float(rows.y[row]), [])
-            self._losses.setdefault(tree_id, new).serials.extend(serials.tolist())
+        branch_pipe = self._traits.of["branch_pipe"]
+        return management.prune(self, tree_id, metamer, branches, branch_pipe)
 
     # ------------------------------------------------------------------ what it is now
 
@@ -423,23 +376,35 @@ class Stand:
             "y_m": self.rows.y,
             "age": self._step - self.rows.birth,
         }
-        hidden = ("breast_serial", "breast_birth", "breast_radius_m")
-        columns.update({k: v for k, v in measures._asdict().items() if k not in hidden})
+        columns.update(measures.columns())
         return pd.DataFrame(columns)
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""
         return measure_trees(self.arena.metamers, self.rows, self._measures_of, self._full_light)
 
-    def skeleton(self, tree_id: int) -> Skeleton:
-        """The shape of a living tree."""
+    def skeleton(self, tree_id: int, season: Literal["summer", "winter"] = "summer") -> Skeleton:
+        """The shape of a living tree.
+
+        Parameters
+        ----------
+        tree_id : int
+            A living tree.
+        season : {"summer", "winter"}
+            Where trees bend: under its load of leaves and fruit, or as it springs up without
+            (Taylor-Hell 2005, 6.3).
+        """
         from forest.trees.skeleton import skeleton_of
 
         row = self.row_of(tree_id)
         kind = int(self.rows.species[row])
+        metamers, rows = self.arena.metamers, self.rows
+        if season == "winter" and self.mechanics is not None:
+            metamers, rows = self.mechanics.winter(self.arena, self.rows, row)
+            row = 0
         return skeleton_of(
-            self.arena.metamers,
-            self.rows,
+            metamers,
+            rows,
             row,
             species=self.species_names[kind],
             pipe_exponent=float(self.pipe_exponent[kind]),
@@ -450,20 +415,20 @@ class Stand:
         """Find the row of a living tree."""
         return table.row_of(self.rows, tree_id, where="Stand")
 
-    def _serials(self, row: int) -> NDArray[np.int32]:
-        start, size = int(self.rows.start[row]), int(self.rows.size[row])
-        return self.arena.metamers.serial[start : start + size].copy()
-
     def _sample_serials(self) -> dict[int, NDArray[np.int32]]:
         """Serials of the sample trees' metamers before the year, to tell what was shed."""
-        rows = np.flatnonzero(np.isin(self.rows.tree_id, self.sample_ids))
-        return {int(self.rows.tree_id[row]): self._serials(row) for row in rows}
+        serials = {}
+        for row in np.flatnonzero(np.isin(self.rows.tree_id, self.sample_ids)):
+            start, size = int(self.rows.start[row]), int(self.rows.size[row])
+            living = self.arena.metamers.serial[start : start + size]
+            serials[int(self.rows.tree_id[row])] = living.copy()
+        return serials
 
     # ------------------------------------------------------------------ checkpoints
 
     def state(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Everything that the next year needs: arrays, and a few numbers (JSON)."""
-        arrays = pack(self.arena.metamers, self.rows) | self._surroundings.state()
+        arrays = pack(self.arena, self.rows) | self._surroundings.state()
         meta = {
             "step": self._step,
             "next_id": self._next_id,

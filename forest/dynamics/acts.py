@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import ActError, InputError
-from forest.trees.metamers import Metamers
 from forest.trees.pruning import choose_branches, find_cuts
-from forest.trees.table import Trees, row_of
+from forest.trees.table import row_of
 
 if TYPE_CHECKING:
-    from forest.scenario.acts import Act, Prune
+    from forest.scenario.acts import Prune
+    from forest.stand import Stand
 
 
 class YearOfActs(NamedTuple):
@@ -34,9 +34,7 @@ class YearOfActs(NamedTuple):
     plantings: list[tuple[Sequence[float], Sequence[float], list[str]]]
 
 
-def acts_of(
-    acts: Sequence[Act], year: int, arena: Metamers, trees: Trees, species: Sequence[str]
-) -> YearOfActs:
+def acts_of(stand: Stand, year: int) -> YearOfActs:
     """Find out what the acts of a year do to the stand as it is before that year.
 
     All of them see the same stand, whatever their order in the file: first it is pruned, then
@@ -44,14 +42,10 @@ def acts_of(
 
     Parameters
     ----------
-    acts : sequence of Act
-        The scenario's acts, of all years.
+    stand : Stand
+        With the acts of all years in its scenario.
     year : int
         Calendar year.
-    arena, trees : Metamers, Trees
-        The stand.
-    species : sequence of str
-        Names of the scenario's species.
 
     Raises
     ------
@@ -59,26 +53,25 @@ def acts_of(
         If an act names a tree that does not live, or a metamer that is not there.
     """
     due = YearOfActs({}, [], [])
-    for i, act in enumerate(acts):
+    for i, act in enumerate(stand.scenario.acts):
         if act.year != year:
             continue
         try:
             if act.kind == "prune":
-                _add_cuts(due.cuts, act, arena, trees, f"acts[{i}].{{}} in {year}")
+                _add_cuts(due.cuts, act, stand, f"acts[{i}].{{}} in {year}")
             elif act.kind == "fell":
                 for tree_id in act.tree_ids:
-                    row_of(trees, tree_id, where=f"acts[{i}].tree_ids in {year}")
+                    row_of(stand.rows, tree_id, where=f"acts[{i}].tree_ids in {year}")
                 due.fellings.append((act.tree_ids, act.cause))
             else:
-                due.plantings.append((act.x_m, act.y_m, act.names(species)))
+                due.plantings.append((act.x_m, act.y_m, act.names(stand.species_names)))
         except InputError as refusal:
             raise ActError(str(refusal)) from None
     return due
 
 
-def _add_cuts(
-    cuts: dict[int, NDArray[np.int32]], act: Prune, arena: Metamers, trees: Trees, where: str
-) -> None:
+def _add_cuts(cuts: dict[int, NDArray[np.int32]], act: Prune, stand: Stand, where: str) -> None:
+    arena, trees = stand.arena.metamers, stand.rows
     for tree_id in act.ids:
         row = row_of(trees, tree_id, where=where.format(act.ids_key))
         if act.metamer is None:

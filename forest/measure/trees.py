@@ -59,9 +59,15 @@ class TreeMeasures(NamedTuple):
     light: NDArray[np.float64]  # mean relative light of the living sites; NaN without one
     metamers: NDArray[np.int32]
     buds: NDArray[np.int32]  # living sites
-    breast_serial: NDArray[np.int32]  # metamer at breast height; -1 while there is none
+    breast_metamer: NDArray[np.int32]  # metamer at breast height, in the tree's extent; or -1
+    breast_serial: NDArray[np.int32]  # its serial; -1 while there is none
     breast_birth: NDArray[np.int32]  # step in which that metamer was made; -1 while there is none
     breast_radius_m: NDArray[np.float32]  # under bark at breast height; 0 while there is none
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Give what is measured, by column, without what only helps to find breast height."""
+        named = self._asdict().items()
+        return {name: column for name, column in named if not name.startswith("breast_")}
 
 
 @njit
@@ -170,6 +176,7 @@ def _measure_tree(
     if breast < 0:
         out.dbh_cm[t] = _NAN
         out.basal_area_m2[t] = 0.0
+        out.breast_metamer[t] = -1
         out.breast_serial[t] = -1
         out.breast_birth[t] = -1
         out.breast_radius_m[t] = 0.0
@@ -178,6 +185,7 @@ def _measure_tree(
         dbh = under * over_bark
         out.dbh_cm[t] = 100.0 * dbh
         out.basal_area_m2[t] = _QUARTER_PI * dbh * dbh
+        out.breast_metamer[t] = breast
         out.breast_serial[t] = metamers.serial[first + breast]
         out.breast_birth[t] = metamers.birth[first + breast]
         out.breast_radius_m[t] = 0.5 * under
@@ -234,7 +242,7 @@ def measure_trees(
     """
     n = len(trees.tree_id)
     columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in TreeMeasures._fields}
-    for name in ("metamers", "buds", "breast_serial", "breast_birth"):
+    for name in ("metamers", "buds", "breast_metamer", "breast_serial", "breast_birth"):
         columns[name] = np.empty(n, np.int32)
     columns["breast_radius_m"] = np.empty(n, np.float32)
     out = TreeMeasures(**columns)

@@ -21,6 +21,7 @@ from forest.scenario.model import (
     Environment,
     Explicit,
     Growth,
+    Mechanics,
     Obstacle,
     Output,
     Planting,
@@ -74,6 +75,7 @@ class Scenario(Table):
     site: Site = Site()
     weather: Weather = Weather()
     growth: Growth = Growth()
+    mechanics: Mechanics | None = None
     environment: Environment
     species: dict[str, SpeciesUse] = quantity(
         ...,

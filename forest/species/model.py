@@ -278,6 +278,9 @@ class Mechanics(Table):
     fruit_mass_kg: float = quantity(
         0.0, "fresh mass of the fruit at a living site in summer", unit="kg", ge=0, le=10
     )
+    drag_coefficient: float = quantity(
+        0.3, "drag of the crown per frontal area, before leaves stream with the wind", ge=0, le=2
+    )
     tropic_force_n: float = quantity(
         0.0,
         "force that turns a new metamer upwards (F_tropic, eq. 4); 0 = off",

@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.trees.metamers import Arena, Metamers
+from forest.trees.metamers import Arena
 from forest.trees.table import Trees
 
 Arrays = dict[str, NDArray[Any]]
 
 
-def pack(arena: Metamers, trees: Trees) -> Arrays:
-    """Give the table's columns (`tree_<name>`), and the metamers of its trees in its order."""
+def pack(arena: Arena, trees: Trees) -> Arrays:
+    """Give the table's columns, and the fields of its trees' metamers in its order."""
     arrays = {f"tree_{name}": column for name, column in trees._asdict().items()}
     spans = [(int(s), int(s) + int(n)) for s, n in zip(trees.start, trees.size, strict=True)]
-    for name, field in arena._asdict().items():
+    for name, field in _fields(arena):
         parts = [field[a:b] for a, b in spans]
-        arrays[f"metamer_{name}"] = np.concatenate(parts) if parts else field[:0]
+        arrays[name] = np.concatenate(parts) if parts else field[:0]
     return arrays
 
 
@@ -33,8 +33,18 @@ def unpack(arrays: Arrays, arena: Arena) -> Trees:
     at = 0
     for row, n in enumerate(size):
         s = int(trees.start[row])
-        for name, field in arena.metamers._asdict().items():
-            field[s : s + n] = arrays[f"metamer_{name}"][at : at + n]
+        for name, field in _fields(arena):
+            field[s : s + n] = arrays[name][at : at + n]
         at += int(n)
     trees.size[:] = size
     return trees
+
+
+def _fields(arena: Arena) -> list[tuple[str, NDArray[Any]]]:
+    """Name the arrays of the arena."""
+    groups = {"metamer": arena.metamers, "companion": arena.companions}
+    return [
+        (f"{group}_{name}", field)
+        for group, fields in groups.items()
+        for name, field in zip(getattr(fields, "_fields", ()), fields, strict=True)
+    ]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forest.errors import InputError
-from forest.trees.metamers import BRANCHED, CONTINUED, MAIN, Metamers
+from forest.trees.metamers import BRANCHED, CONTINUED, MAIN, Arena, Metamers, close_ranks
 from forest.trees.skeleton import number_axes
 from forest.trees.table import Trees
 
@@ -27,7 +26,7 @@ class Branches(NamedTuple):
     height_m : float64 (k,)
         Height above the ground of its foot, m.
     azimuth_deg : float64 (k,)
-        Where it points, from its foot to the tip of its axis: 0 along x, 90 along y, -180 to 180;
+        Where it points, from its foot to the tip of its axis: 0 along x, 90 along y, 0 to 360;
         NaN if it points straight up or down.
     """
 
@@ -47,7 +46,7 @@ def branches_of(arena: Metamers, trees: Trees, row: int) -> Branches:
     first = np.flatnonzero((order == 1) & (order[parent] == 0))
     foot = tip[parent[first]]
     x, y, _ = (tip[last[axis[first]]] - foot).T
-    azimuth = np.where((x == 0) & (y == 0), np.nan, np.degrees(np.arctan2(y, x)))
+    azimuth = np.where((x == 0) & (y == 0), np.nan, np.degrees(np.arctan2(y, x)) % 360.0)
     return Branches(arena.serial[part][first], foot[:, 2], azimuth)
 
 
@@ -113,13 +112,13 @@ def find_cuts(
 
 
 def cut_branches(
-    arena: Metamers, trees: Trees, row: int, serials: Sequence[int] | ArrayLike, branch_pipe: float
+    place: Arena, trees: Trees, row: int, serials: ArrayLike, branch_pipe: float
 ) -> NDArray[np.int32]:
     """Remove metamers and everything they carry, and close the gaps in the tree's extent.
 
     Parameters
     ----------
-    arena : Metamers
+    place : Arena
         The arena; changed in place.
     trees : Trees
         The tree table; `size` is changed in place.
@@ -141,11 +140,12 @@ def cut_branches(
     InputError
         If no metamer has such a serial, or if it is the tree's first; then nothing is cut.
     """
+    arena = place.metamers
     cuts = find_cuts(arena, trees, row, serials, where="Stand.prune")
     part = _extent(trees, row)
-    start = part.start
+    start, n = part.start, part.stop - part.start
     parent = arena.parent[part].copy()
-    gone = np.zeros(len(parent), np.bool_)
+    gone = np.zeros(n, np.bool_)
     gone[cuts] = True
     below = np.maximum(parent, 0)
     while below.any():  # reaches twice as far down each time; the base itself never goes
@@ -156,13 +156,9 @@ def cut_branches(
         arena.state[start + parent[cut]] &= np.uint8(255 - bit)
         _release_sapwood(arena, start, parent, int(cut), branch_pipe)
     lost = arena.serial[part][gone]
-    stays = np.flatnonzero(~gone)
-    new_index = np.cumsum(~gone) - 1
-    for field in arena:
-        field[start : start + stays.size] = field[part][stays]
-    kept = arena.parent[start : start + stays.size]
-    kept[1:] = new_index[kept[1:]]
-    trees.size[row] = stays.size
+    trees.size[row] = close_ranks(
+        arena.parent[part], place.fields, start, n, gone.astype(np.int32), np.empty(n, np.int32)
+    )
     return lost
 
 
