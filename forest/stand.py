@@ -66,7 +66,11 @@ class Stand:
         self.species = scenario.species_list
         self.species_names = [s.name for s in self.species]
         self._paper = scenario.mode == "paper"
-        self._traits = species_traits(self.species, paper=self._paper)
+        self._traits = species_traits(
+            self.species,
+            paper=self._paper,
+            bending=scenario.mechanics is not None and scenario.mechanics.bending,
+        )
         self._measures_of = _measure_species(self)
         self._surroundings = Surroundings(scenario, self.pipe_exponent)
         self.mechanics: Mechanics | None = None

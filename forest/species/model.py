@@ -317,6 +317,14 @@ class Mechanics(Table):
     ring_swell: float = quantity(
         1.5, "width of a reaction ring along the bending direction per width across it", ge=1, le=2
     )
+    sag_limit_rad: float = quantity(
+        0.3,
+        "turn by which a level limb may sag at its tip; what would sag more is thickened first "
+        "where trees bend, in mass-balance mode (elastic similarity, McMahon and Kronauer 1976)",
+        unit="rad",
+        gt=0,
+        le=10,
+    )
     deviation_limit_rad_m: float = quantity(
         0.05,
         "departure from the rest curvature beyond which beta righting sets in (xi)",
