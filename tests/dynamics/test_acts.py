@@ -134,6 +134,24 @@ def test_sample_trees_cut_by_hand() -> None:
     assert_same_years([first, second], steps(restored, 2))
 
 
+def test_the_shipped_pine_regains_its_balance() -> None:
+    """Pruned on its south side before 2014, it has gone half of the way back by 2034."""
+    pine = Scenario.load(Path(__file__).parents[2] / "scenarios" / "pruned_pine.toml")
+    north: dict[int, list[float]] = {2014: [], 2034: []}
+    for seed in (1, 2, 3, 4):
+        stand = Stand(pine.with_overrides([f"seed={seed}"]))
+        while stand.year < 2034:
+            stand.step()
+            if stand.year in north:
+                tree = stand.skeleton(1)
+                mass = tree.radius**2 * tree.length
+                y = 0.5 * (tree.start[:, 1] + tree.end[:, 1]) - tree.start[0, 1]
+                north[stand.year].append(float((mass * y).sum() / mass.sum()))
+    pruned, later = (np.mean(values) for values in north.values())
+    assert pruned > 0.1
+    assert later < 0.6 * pruned
+
+
 UNKNOWN = "{kind='prune', year=2005, tree_ids=[1, 99], below_m=0.4}"
 
 
