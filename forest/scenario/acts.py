@@ -88,10 +88,8 @@ class Branches(Table):
         return _HALF_PLANE_DEG if self.within_deg is None else self.within_deg
 
 
-class Prune(Branches):
-    """Cut branches off some trees: those that one of metamer, below_m and side_deg names."""
-
-    _choices: ClassVar[tuple[str, ...]] = ("metamer", "below_m", "side_deg")
+class _TreesToPrune(Table):
+    """The keys of a pruning that do not choose branches; they come first in the documentation."""
 
     kind: Literal["prune"] = quantity("prune", "kind of act", unit="")
     year: int = _year()
@@ -108,7 +106,7 @@ class Prune(Branches):
     )
 
     @model_validator(mode="after")
-    def _names_its_trees(self) -> Prune:
+    def _names_its_trees(self) -> Self:
         if (self.tree_id is None) == (self.tree_ids is None):
             what = "missing" if self.tree_id is None else "tree_id and tree_ids are both given"
             key = "tree_id" if self.tree_id is None else ""
@@ -128,6 +126,12 @@ class Prune(Branches):
     def ids_key(self) -> str:
         """The key that names the trees."""
         return "tree_ids" if self.tree_id is None else "tree_id"
+
+
+class Prune(Branches, _TreesToPrune):
+    """Cut branches off some trees: those that one of metamer, below_m and side_deg names."""
+
+    _choices: ClassVar[tuple[str, ...]] = ("metamer", "below_m", "side_deg")
 
 
 class Fell(Table):
