@@ -23,9 +23,9 @@ from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import remember_breast
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.year import Mechanics, MechanicsSpec
+from forest.stand_state import put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.trees.packing import pack, unpack
 from forest.yearbook import Event, Loss, YearRecord, record_year
 
 if TYPE_CHECKING:
@@ -51,6 +51,18 @@ class Stand:
         The tree table, one row per living tree, in order of tree id.
     arena : Arena
         The metamers of all trees.
+    steps : int
+        Years grown so far.
+    pending : list of Event
+        Events since the last record.
+    losses : dict of int to Loss
+        What acts took from sample trees since the last record, by tree id.
+    next_id : int
+        Id of the next tree.
+    mechanics : Mechanics or None
+        What bends and holds the trees, where the scenario has mechanics.
+    surroundings : Surroundings
+        Light and space.
     seconds : dict of str to float
         Wall time spent in each phase of the year so far.
     """
@@ -71,8 +83,8 @@ class Stand:
             paper=self._paper,
             bending=scenario.mechanics is not None and scenario.mechanics.bending,
         )
-        self._measures_of = _measure_species(self)
-        self._surroundings = Surroundings(scenario, self.pipe_exponent)
+        self._measures_of = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
@@ -80,10 +92,10 @@ class Stand:
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
-        self._step = 0
-        self._next_id = 1
-        self._pending: list[Event] = []
-        self._losses: dict[int, Loss] = {}
+        self.steps = 0
+        self.next_id = 1
+        self.pending: list[Event] = []
+        self.losses: dict[int, Loss] = {}
         self.sample_ids: list[int] = []
         self.seconds: dict[str, float] = {}
 
@@ -100,7 +112,7 @@ class Stand:
         self._clock = time.perf_counter()
         management.act(self, self._traits.of["branch_pipe"])
         self._lap("act")
-        self._step += 1
+        self.steps += 1
         year = self._year()
         accounts = np.zeros((len(self.rows.tree_id), budget.ACCOUNTS))
         shared = deal(self.rows.size)
@@ -120,7 +132,7 @@ class Stand:
         return record
 
     def _expose(self) -> None:
-        self._surroundings.expose(self.arena.metamers, self.rows, self._step)
+        self.surroundings.expose(self.arena.metamers, self.rows, self.steps)
         self._lap("expose")
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
@@ -155,7 +167,7 @@ class Stand:
         shoots = shooting_buds(self.arena.metamers, rows, shared, self._traits)
         self.arena.make_room(rows.start, rows.size, rows.room, rows.size + shoots.new)
         arena = self.arena.metamers
-        toward = self._surroundings.directions(arena, rows, shoots)
+        toward = self.surroundings.directions(arena, rows, shoots)
         extend(
             arena,
             rows,
@@ -164,8 +176,8 @@ class Stand:
             toward,
             self._traits,
             year,
-            self._surroundings.solid,
-            self._surroundings.voxel_m,
+            self.surroundings.solid,
+            self.surroundings.voxel_m,
         )
         self._lap("extend")
         return deal(rows.size)
@@ -184,7 +196,7 @@ class Stand:
 
     def _bend(self) -> None:
         if self.mechanics is not None:
-            self.mechanics.bend(self.arena, self.rows, self._step)
+            self.mechanics.bend(self.arena, self.rows, self.steps)
             self._lap("bend")
 
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
@@ -203,8 +215,8 @@ class Stand:
 
     def _bury(self, dead: list[tuple[int, str]], measures: TreeMeasures) -> None:
         remember_breast(self.rows, measures)
-        self._pending = []
-        self._losses = {}
+        self.pending = []
+        self.losses = {}
         if dead:
             alive = np.ones(len(self.rows.tree_id), np.bool_)
             alive[[row for row, _ in dead]] = False
@@ -219,7 +231,7 @@ class Stand:
             [(e.year, e.factor) for e in s.weather.extreme_years],
         )
         return Year(
-            step=self._step,
+            step=self.steps,
             seed=s.seed,
             income_factor=factor * s.site.productivity,
             full_light=self._full_light,
@@ -257,24 +269,24 @@ class Stand:
         check_planting(*at, names, (width, depth), self.species_names)
         if self.scenario.plot.boundary == "periodic":
             at = at[0] % width, at[1] % depth
-        first = self._next_id
+        first = self.next_id
         self._plant(*at, np.array([self.species_names.index(name) for name in names], np.int16))
-        return list(range(first, self._next_id))
+        return list(range(first, self.next_id))
 
     def _plant(self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]) -> None:
         more = seedlings(
             x,
             y,
             species,
-            first_id=self._next_id,
-            step=self._step,
+            first_id=self.next_id,
+            step=self.steps,
             seed=self.scenario.seed,
-            voxel_m=self._surroundings.voxel_m,
+            voxel_m=self.surroundings.voxel_m,
             vigour_sd=np.array([s.carbon.vigour_sd for s in self.species]),
             seed_reserve_kg=np.array([s.carbon.seed_reserve_kg for s in self.species]),
         )
         first_row = len(self.rows.tree_id)
-        self._next_id += len(more.tree_id)
+        self.next_id += len(more.tree_id)
         self.rows = table.append(self.rows, more)
         rows = self.rows
         wanted = rows.size.astype(np.int64)
@@ -283,7 +295,7 @@ class Stand:
         sprout(self.arena.metamers, rows, first_row, self._traits, self._year())
         measures = self.measure()
         for row in range(first_row, len(rows.tree_id)):
-            self._pending.append(Event.of(self, row, "planted", "none", measures))
+            self.pending.append(Event.of(self, row, "planted", "none", measures))
 
     def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> None:
         """Fell trees: they are gone at once, with an event in the next year's record.
@@ -336,27 +348,12 @@ class Stand:
     @property
     def year(self) -> int:
         """The last complete calendar year."""
-        return self.scenario.start_year + self._step - 1
-
-    @property
-    def steps(self) -> int:
-        """Years grown so far."""
-        return self._step
-
-    @property
-    def pending(self) -> list[Event]:
-        """Events since the last record."""
-        return self._pending
-
-    @property
-    def losses(self) -> dict[int, Loss]:
-        """What acts took from sample trees since the last record, by tree id."""
-        return self._losses
+        return self.scenario.start_year + self.steps - 1
 
     @property
     def floor_light(self) -> float:
         """Mean relative irradiance on the ground, 0..1; NaN without a far field."""
-        return self._surroundings.floor_light()
+        return self.surroundings.floor_light()
 
     @property
     def pipe_exponent(self) -> NDArray[np.float64]:
@@ -365,7 +362,7 @@ class Stand:
 
     @property
     def _full_light(self) -> float:
-        return self._surroundings.full_light
+        return self.surroundings.full_light
 
     @property
     def trees(self) -> pd.DataFrame:
@@ -378,7 +375,7 @@ class Stand:
             "species": [self.species_names[k] for k in self.rows.species],
             "x_m": self.rows.x,
             "y_m": self.rows.y,
-            "age": self._step - self.rows.birth,
+            "age": self.steps - self.rows.birth,
         }
         columns.update(measures.columns())
         return pd.DataFrame(columns)
@@ -422,27 +419,18 @@ class Stand:
     def _sample_serials(self) -> dict[int, NDArray[np.int32]]:
         """Serials of the sample trees' metamers before the year, to tell what was shed."""
         serials = {}
-        for row in np.flatnonzero(np.isin(self.rows.tree_id, self.sample_ids)):
-            start, size = int(self.rows.start[row]), int(self.rows.size[row])
-            living = self.arena.metamers.serial[start : start + size]
-            serials[int(self.rows.tree_id[row])] = living.copy()
+        for tree_id in self.sample_ids:
+            row = int(np.searchsorted(self.rows.tree_id, tree_id))
+            if row < len(self.rows.tree_id) and self.rows.tree_id[row] == tree_id:
+                start, size = int(self.rows.start[row]), int(self.rows.size[row])
+                serials[tree_id] = self.arena.metamers.serial[start : start + size].copy()
         return serials
 
     # ------------------------------------------------------------------ checkpoints
 
     def state(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Everything that the next year needs: arrays, and a few numbers (JSON)."""
-        arrays = pack(self.arena, self.rows) | self._surroundings.state()
-        meta = {
-            "step": self._step,
-            "next_id": self._next_id,
-            "sample_ids": list(self.sample_ids),
-            "pending": [
-                [None if value != value else value for value in event] for event in self._pending
-            ],
-            "losses": {str(tree_id): list(loss) for tree_id, loss in self._losses.items()},
-        }
-        return arrays, meta
+        return take_state(self)
 
     @classmethod
     def restore(
@@ -451,31 +439,5 @@ class Stand:
         """Build the stand that `state` was taken of."""
         stand = cls.__new__(cls)
         stand._start(scenario)
-        stand._step = int(meta["step"])
-        stand._next_id = int(meta["next_id"])
-        stand.sample_ids = [int(i) for i in meta["sample_ids"]]
-        stand._pending = [
-            Event._make(np.nan if value is None else value for value in event)
-            for event in meta["pending"]
-        ]
-        stand._losses = {int(i): Loss._make(loss) for i, loss in meta["losses"].items()}
-        stand.rows = unpack(arrays, stand.arena)
-        stand._surroundings.restore(arrays)
+        put_state(stand, arrays, meta)
         return stand
-
-
-def _measure_species(stand: Stand) -> MeasureSpecies:
-    species = stand.species
-
-    def each(section: str, key: str, scale: float = 1.0) -> NDArray[np.float64]:
-        return np.array([scale * getattr(getattr(s, section), key) for s in species], np.float64)
-
-    return MeasureSpecies(
-        pipe_exponent=stand.pipe_exponent,
-        bark_factor=each("mensuration", "bark_factor"),
-        density_kg_m3=each("wood", "density_kg_m3"),
-        leaf_area_m2=each("leaves", "area_m2"),
-        sla_m2_kg=each("leaves", "sla_m2_kg"),
-        merchantable_top_m=each("mensuration", "merchantable_top_cm", 0.01),
-        stump_height_m=each("mensuration", "stump_height_m"),
-    )

@@ -11,13 +11,15 @@ A node bears one lateral bud, so that branch is the only one, and one forward sc
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import driver, njit
 from forest._threads import in_threads
+from forest.species import Species
 from forest.trees.metamers import CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
 
@@ -39,6 +41,24 @@ class MeasureSpecies(NamedTuple):
     sla_m2_kg: NDArray[np.float64]  # specific leaf area
     merchantable_top_m: NDArray[np.float64]  # smallest diameter over bark that is sold
     stump_height_m: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, species: Sequence[Species], pipe_exponent: NDArray[np.float64]) -> Self:
+        """Read the species; the exponent is that of the run."""
+
+        def each(section: str, key: str, scale: float = 1.0) -> NDArray[np.float64]:
+            values = [scale * getattr(getattr(s, section), key) for s in species]
+            return np.array(values, np.float64)
+
+        return cls(
+            pipe_exponent=pipe_exponent,
+            bark_factor=each("mensuration", "bark_factor"),
+            density_kg_m3=each("wood", "density_kg_m3"),
+            leaf_area_m2=each("leaves", "area_m2"),
+            sla_m2_kg=each("leaves", "sla_m2_kg"),
+            merchantable_top_m=each("mensuration", "merchantable_top_cm", 0.01),
+            stump_height_m=each("mensuration", "stump_height_m"),
+        )
 
 
 class TreeMeasures(NamedTuple):

@@ -70,6 +70,22 @@ def _hang_chunks(first, step, arena, trees, shared, species, weight):  # type: i
                 weight[i, 1] = site * sites
 
 
+@driver
+def _ground_chunks(first, step, arena, trees, shared):  # type: ignore[no-untyped-def]
+    bare = np.uint8(255 - TERMINAL - LATERAL)
+    for b in range(first, BINS, step):
+        for k in range(shared.first[b], shared.first[b + 1]):
+            row = shared.rows[k]
+            for i in range(trees.start[row], trees.start[row] + trees.size[row]):
+                if arena.tip[i, 2] < 0.0:
+                    arena.state[i] &= bare
+
+
+def bury_sites(arena: Metamers, trees: Trees, shared: Deal) -> None:
+    """Let the sites die that hang below the ground; what bears none is shed next year."""
+    in_threads(_ground_chunks, arena, trees, shared)
+
+
 def hang(arena: Metamers, trees: Trees, shared: Deal, species: LoadSpecies, loads: Loads) -> None:
     """Set the weights of all metamers: wood at their middle, leaves and fruit at their tip, N."""
     in_threads(_hang_chunks, arena, trees, shared, species, loads.weight)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from forest.growth.dealing import deal
 from forest.mechanics.branch_points import reaction_rings
 from forest.mechanics.equilibrium import Bench, Settled, settle
-from forest.mechanics.loads import LoadSpecies, hang, make_loads
+from forest.mechanics.loads import LoadSpecies, bury_sites, hang, make_loads
 from forest.mechanics.righting import BETA, NONE, STRAIN
 from forest.mechanics.rings import upright_azimuth
 from forest.mechanics.rods import Rods, allocate_rods, frame_new
@@ -108,6 +108,7 @@ class Mechanics:
             self._bench.work(shared),
             tolerance=self._spec.tolerance_rad,
         )
+        bury_sites(metamers, trees, shared)
 
     def winter(self, arena: Arena, trees: Trees, row: int) -> tuple[Metamers, Trees]:
         """Give one tree as it stands in winter, without fruit and what leaves fall.
