@@ -51,6 +51,25 @@ class Event(NamedTuple):
         )
 
 
+class Loss(NamedTuple):
+    """What acts since the last record took from a sample tree.
+
+    Attributes
+    ----------
+    species : int
+        Index into the scenario's species.
+    x, y : float
+        Place of its stem base, m.
+    serials : list of int
+        Serial numbers of the metamers that went.
+    """
+
+    species: int
+    x: float
+    y: float
+    serials: list[int]
+
+
 class YearRecord(NamedTuple):
     """One year of a stand.
 
@@ -90,7 +109,7 @@ def record_year(
     accounts : float64 (rows, ACCOUNTS)
         The year's carbon accounts, kg per tree.
     serials_before : dict
-        Serials of the sample trees' metamers before the year.
+        Serials of the sample trees' metamers before the year, after acts.
     rings : RingYear
         What the year's rings are read from.
     """
@@ -242,20 +261,44 @@ def choose_samples(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> 
 def _sample_years(
     stand: Stand, dead: list[tuple[int, str]], before: dict[int, NDArray[np.int32]]
 ) -> dict[int, SampleYear]:
-    """Tell the year of each living sample tree; one that dies loses all its metamers."""
+    """Tell the year of each sample tree; one that dies or is felled loses all its metamers."""
     rows = stand.rows
     dies = {row for row, _ in dead}
     years = {}
     for tree_id in stand.sample_ids:
         row = int(np.searchsorted(rows.tree_id, tree_id))
         known = before.get(tree_id)
-        if row == len(rows.tree_id) or rows.tree_id[row] != tree_id:
-            continue
-        years[tree_id] = _sample_year(stand, row, known, row in dies)
+        loss = stand.losses.get(tree_id)
+        if row < len(rows.tree_id) and rows.tree_id[row] == tree_id:
+            cut = [] if loss is None else loss.serials
+            years[tree_id] = _sample_year(stand, row, known, cut, row in dies)
+        elif loss is not None:
+            years[tree_id] = _felled_year(loss)
     return years
 
 
-def _sample_year(stand: Stand, row: int, known: NDArray[np.int32] | None, dies: bool) -> SampleYear:
+def _felled_year(loss: Loss) -> SampleYear:
+    """Tell the last year of a felled tree: nothing is left to measure."""
+    none = np.empty(0, np.int32)
+    return SampleYear(
+        species=loss.species,
+        base=np.array([loss.x, loss.y, 0.0]),
+        new_serial=none,
+        new_parent_serial=none,
+        new_end=np.empty((0, 3), np.float32),
+        new_order=np.empty(0, np.uint8),
+        new_main=np.empty(0, np.bool_),
+        new_birth_year=none,
+        dead_serial=np.array(sorted(loss.serials), np.int32),
+        serial=none,
+        radius=np.empty(0, np.float32),
+        leafy=np.empty(0, np.bool_),
+    )
+
+
+def _sample_year(
+    stand: Stand, row: int, known: NDArray[np.int32] | None, cut: list[int], dies: bool
+) -> SampleYear:
     rows = stand.rows
     start, n = int(rows.start[row]), int(rows.size[row])
     part = slice(start, start + n)
@@ -271,6 +314,7 @@ def _sample_year(stand: Stand, row: int, known: NDArray[np.int32] | None, dies: 
         new = serial > known[-1]
         place = np.minimum(np.searchsorted(serial, known), n - 1)
         lost = known[serial[place] != known]
+    lost = np.union1d(lost, np.array(cut, np.int32))
     state = arena.state[part]
     exponent = float(stand.pipe_exponent[rows.species[row]])
     if dies:

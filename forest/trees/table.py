@@ -7,6 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.errors import InputError
+
+#: Ids that a message lists before it breaks off.
+_LISTED = 8
+
 #: Heights at which rings can be told.
 DISCS = 8
 
@@ -77,3 +82,23 @@ def keep(trees: Trees, rows: NDArray[np.bool_]) -> Trees:
         name: np.ascontiguousarray(column[rows]) for name, column in trees._asdict().items()
     }
     return Trees(**columns)
+
+
+def row_of(trees: Trees, tree_id: int, *, where: str) -> int:
+    """Find the row of a living tree; `where` names the act that asks for it in messages.
+
+    Raises
+    ------
+    InputError
+        If no living tree has that id.
+    """
+    row = int(np.searchsorted(trees.tree_id, tree_id))
+    if row == len(trees.tree_id) or trees.tree_id[row] != tree_id:
+        living = ", ".join(str(i) for i in trees.tree_id[:_LISTED])
+        more = f", ... ({len(trees.tree_id)} trees)" if len(trees.tree_id) > _LISTED else ""
+        raise InputError(
+            f"no living tree has the id {tree_id}",
+            where=where,
+            expected=f"one of {living}{more}" if living else "a living tree, but there is none",
+        )
+    return row
