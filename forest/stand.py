@@ -51,6 +51,8 @@ class Stand:
         The tree table, one row per living tree, in order of tree id.
     arena : Arena
         The metamers of all trees.
+    measured_species : MeasureSpecies
+        What mensuration must know of the species.
     seconds : dict of str to float
         Wall time spent in each phase of the year so far.
     """
@@ -66,7 +68,7 @@ class Stand:
         self.species_names = [s.name for s in self.species]
         self._paper = scenario.mode == "paper"
         self._traits = species_traits(self.species, paper=self._paper)
-        self._measures_of = _measure_species(self)
+        self.measured_species = _measure_species(self)
         self._surroundings = Surroundings(scenario, self.pipe_exponent)
         self.arena = Arena()
         self.rows = table.empty()
@@ -166,7 +168,7 @@ class Stand:
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
         """Measure all trees; name the rows of those that die, with the cause."""
         measures = measure_trees(
-            self.arena.metamers, self.rows, self._measures_of, self._full_light
+            self.arena.metamers, self.rows, self.measured_species, self._full_light
         )
         dead: list[tuple[int, str]] = []
         if not self._paper:
@@ -372,7 +374,7 @@ class Stand:
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""
-        return measure_trees(self.arena.metamers, self.rows, self._measures_of, self._full_light)
+        return measure_trees(self.arena.metamers, self.rows, self.measured_species, self._full_light)
 
     def skeleton(self, tree_id: int) -> Skeleton:
         """The shape of a living tree."""
