@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 MODULE_M = 0.1
 
 _WASTE = -1
+_EQUAL = 1e-9
 
 
 class Product(NamedTuple):
@@ -178,7 +179,8 @@ def _best_cuts(
     best = np.zeros((n, places))
     choice = np.full((n, places), _WASTE)
     for here in range(places - 2, -1, -1):
-        value = best[:, here + 1].copy()
+        value = np.zeros(n)
+        made = np.full(n, _WASTE)
         for k, cut in enumerate(cuts):
             end = here + cut.modules
             if end >= places:
@@ -187,8 +189,11 @@ def _best_cuts(
             worth = price * (volume[:, end] - volume[:, here]) + best[:, end]
             better = thick[cut.product][:, end] & (end <= modules) & (worth > value)
             value[better] = worth[better]
-            choice[better, here] = k
-        best[:, here] = value
+            made[better] = k
+        left = best[:, here + 1]
+        wasted = left > value * (1.0 + _EQUAL)  # of equal values, the log is cut further down
+        best[:, here] = np.where(wasted, left, value)
+        choice[:, here] = np.where(wasted, _WASTE, made)
     return choice
 
 
