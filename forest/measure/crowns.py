@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import driver, njit
+from forest._jit import njit
 from forest._threads import in_threads
 from forest.measure.trees import octagon
 from forest.trees.metamers import LATERAL, TERMINAL, Metamers
@@ -241,17 +241,19 @@ def _tips(metamers: Any, begin: Any, size: Any) -> Any:
     """Gather a tree's leaf-bearing tips."""
     state = metamers.state[begin : begin + size]
     tip = metamers.tip[begin : begin + size]
-    tips = np.empty((size + 1, 3))
+    leafy = np.empty(size + 1, np.int32)
     n = 0
     for i in range(size):  # writes always and counts some: a branch here would cost more
-        tips[n, 0] = tip[i, 0]
-        tips[n, 1] = tip[i, 1]
-        tips[n, 2] = tip[i, 2]
+        leafy[n] = i
         n += int((state[i] & (TERMINAL | LATERAL)) != 0)
-    return tips[:n]
+    tips = np.empty((n, 3))
+    for k in range(n):
+        for axis in range(3):
+            tips[k, axis] = tip[leafy[k], axis]
+    return tips
 
 
-@driver
+@njit  # not `driver`: what it calls makes arrays, and that took twice as long there
 def _measure_all(
     first: Any, step: Any, metamers: Any, trees: Any, by_size: Any, slices: Any, out: Any
 ) -> None:

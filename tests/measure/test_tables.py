@@ -184,3 +184,11 @@ def test_a_stand_of_one_tree():
     table = measure_stand(one)
     assert np.isnan(table["nearest_m"][0])
     assert np.isnan(table["hegyi"][0])  # no dbh
+
+
+def test_a_sample_tree_has_no_shape_before_it_was_chosen(run: Run):
+    early = measure_run(run, LAST - 1)
+    (late,) = set(run.samples) - {1, 4}
+    shaped = early.loc[early["crown_volume_m3"].notna(), "tree_id"]
+    assert late in early["tree_id"].tolist()
+    assert set(shaped) == set(run.samples) - {late}
