@@ -374,7 +374,9 @@ class Stand:
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""
-        return measure_trees(self.arena.metamers, self.rows, self.measured_species, self._full_light)
+        return measure_trees(
+            self.arena.metamers, self.rows, self.measured_species, self._full_light
+        )
 
     def skeleton(self, tree_id: int) -> Skeleton:
         """The shape of a living tree."""

@@ -17,8 +17,16 @@ from forest.errors import InputError
 from forest.measure.bark import bark_thickness, diameter_under_bark
 from forest.measure.biomass import compartments
 from forest.measure.bucking import MODULE_M, Product, buck
-from forest.measure.competition import basal_area_of_larger, hegyi_within, size_differentiation
+from forest.measure.competition import (
+    basal_area_of_larger,
+    hegyi_within,
+    height_diversity,
+    relative_species_profile,
+    size_differentiation,
+    species_profile,
+)
 from forest.measure.crowns import Crowns, crown_of, crowns_of
+from forest.measure.density import curtis_rd, summation_sdi
 from forest.measure.stand import Plot
 from forest.measure.stem import Stems, stems_of, stems_of_skeletons
 from forest.measure.structure import Neighbours, mingling
@@ -148,6 +156,39 @@ def tree_columns(
         **parts._asdict(),
         **_among_others(value, of, plot),
     }
+
+
+def stand_indices(trees: pd.DataFrame, plot: Plot) -> dict[str, float]:
+    """Give the indices of a whole stand, beside those of `/stand`.
+
+    Parameters
+    ----------
+    trees : pandas.DataFrame
+        As `measure_run` or `measure_stand` gives them.
+    plot : Plot
+        Size and boundary.
+
+    Returns
+    -------
+    dict of float
+        `summation_sdi`, `curtis_rd`, `species_profile` (Pretzsch's A), `relative_species_profile`,
+        `height_diversity` (Shannon of basal area in layers of 2 m), and the means of the trees'
+        `hegyi`, `bal_m2ha` and `size_differentiation`; NaN where there is no tree to tell.
+    """
+    dbh = trees["dbh_cm"].to_numpy(np.float64)
+    ground = trees["basal_area_m2"].to_numpy(np.float64)
+    height = trees["height_m"].to_numpy(np.float64)
+    qmd = float(np.sqrt((trees["dbh_cm"] ** 2).mean()))
+    indices = {
+        "summation_sdi": summation_sdi(dbh, plot.hectares),
+        "curtis_rd": float(curtis_rd(ground.sum() / plot.hectares, qmd)),
+        "species_profile": species_profile(height, trees["species"]),
+        "relative_species_profile": relative_species_profile(height, trees["species"]),
+        "height_diversity": height_diversity(height, ground),
+    }
+    for name in ("hegyi", "bal_m2ha", "size_differentiation"):
+        indices[name] = float(trees[name].mean())
+    return indices
 
 
 def buck_run(

@@ -20,6 +20,7 @@ from forest.measure.tables import (
     measure_run,
     measure_stand,
     plot_of,
+    stand_indices,
 )
 from forest.record.run import Run
 from forest.simulation import simulate
@@ -68,6 +69,19 @@ def test_crowns_and_stems_agree_with_the_tree_table(stand: Stand):
     assert total.to_numpy() == pytest.approx(table["above_ground_kg"])
     without_bark = (total - table["bark_kg"]).to_numpy()
     assert without_bark == pytest.approx(table["biomass_kg"].to_numpy())
+
+
+def test_indices_of_a_stand(run: Run):
+    trees = measure_run(run, LAST)
+    got = stand_indices(trees, plot_of(run.scenario))
+    row = run.stand.iloc[-1]
+    assert got["curtis_rd"] == pytest.approx(row["basal_area_m2ha"] / row["qmd_cm"] ** 0.5)
+    assert 0 < got["summation_sdi"] <= row["sdi"]
+    assert got["species_profile"] == pytest.approx(got["relative_species_profile"] * np.log(2 * 3))
+    assert got["bal_m2ha"] == pytest.approx(trees["bal_m2ha"].mean())
+    nobody = stand_indices(trees[:0], plot_of(run.scenario))
+    assert nobody.pop("summation_sdi") == 0.0
+    assert np.isnan(list(nobody.values())).all()
 
 
 def test_basal_area_of_the_stand_is_that_of_its_trees(run: Run):
