@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import remember_breast
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
+from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.record.schema import CAUSES
+from forest.stand_state import put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
 from forest.trees.pruning import cut_branch
@@ -53,6 +55,16 @@ class Stand:
         The metamers of all trees.
     measured_species : MeasureSpecies
         What mensuration must know of the species.
+    steps : int
+        Years grown so far.
+    pending : list of Event
+        Events since the last record.
+    next_id : int
+        Id of the next tree.
+    mechanics : Mechanics or None
+        What bends and holds the trees, where the scenario has mechanics.
+    surroundings : Surroundings
+        Light and space.
     seconds : dict of str to float
         Wall time spent in each phase of the year so far.
     """
@@ -67,15 +79,23 @@ class Stand:
         self.species = scenario.species_list
         self.species_names = [s.name for s in self.species]
         self._paper = scenario.mode == "paper"
-        self._traits = species_traits(self.species, paper=self._paper)
-        self.measured_species = _measure_species(self)
-        self._surroundings = Surroundings(scenario, self.pipe_exponent)
-        self.arena = Arena()
+        self._traits = species_traits(
+            self.species,
+            paper=self._paper,
+            bending=scenario.mechanics is not None and scenario.mechanics.bending,
+        )
+        self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self.surroundings = Surroundings(scenario, self.pipe_exponent)
+        self.mechanics: Mechanics | None = None
+        if scenario.mechanics is not None:
+            spec = MechanicsSpec(**scenario.mechanics.model_dump())
+            self.mechanics = Mechanics(spec, self.species, self.pipe_exponent)
+        self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
-        self._step = 0
-        self._next_id = 1
-        self._pending: list[Event] = []
+        self.steps = 0
+        self.next_id = 1
+        self.pending: list[Event] = []
         self.sample_ids: list[int] = []
         self.seconds: dict[str, float] = {}
 
@@ -83,7 +103,7 @@ class Stand:
 
     def step(self) -> YearRecord:
         """Grow for one year and give its record."""
-        self._step += 1
+        self.steps += 1
         self._clock = time.perf_counter()
         year = self._year()
         accounts = np.zeros((len(self.rows.tree_id), budget.ACCOUNTS))
@@ -96,6 +116,7 @@ class Stand:
         self._shed(shared)
         shared = self._extend(year)
         self._thicken(shared, year, accounts)
+        self._bend()
         measures, dead = self._die()
         record = record_year(self, measures, dead, accounts, before)
         self._bury(dead, measures)
@@ -103,7 +124,7 @@ class Stand:
         return record
 
     def _expose(self) -> None:
-        self._surroundings.expose(self.arena.metamers, self.rows, self._step)
+        self.surroundings.expose(self.arena.metamers, self.rows, self.steps)
         self._lap("expose")
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
@@ -123,7 +144,7 @@ class Stand:
 
     def _shed(self, shared: Deal) -> None:
         shed(
-            self.arena.metamers,
+            self.arena,
             self.rows,
             shared,
             self._bench.scratch(shared),
@@ -138,7 +159,7 @@ class Stand:
         shoots = shooting_buds(self.arena.metamers, rows, shared, self._traits)
         self.arena.make_room(rows.start, rows.size, rows.room, rows.size + shoots.new)
         arena = self.arena.metamers
-        toward = self._surroundings.directions(arena, rows, shoots)
+        toward = self.surroundings.directions(arena, rows, shoots)
         extend(
             arena,
             rows,
@@ -147,8 +168,8 @@ class Stand:
             toward,
             self._traits,
             year,
-            self._surroundings.solid,
-            self._surroundings.voxel_m,
+            self.surroundings.solid,
+            self.surroundings.voxel_m,
         )
         self._lap("extend")
         return deal(rows.size)
@@ -164,6 +185,11 @@ class Stand:
             accounts,
         )
         self._lap("thicken")
+
+    def _bend(self) -> None:
+        if self.mechanics is not None:
+            self.mechanics.bend(self.arena, self.rows, self.steps)
+            self._lap("bend")
 
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
         """Measure all trees; name the rows of those that die, with the cause."""
@@ -181,7 +207,7 @@ class Stand:
 
     def _bury(self, dead: list[tuple[int, str]], measures: TreeMeasures) -> None:
         remember_breast(self.rows, measures)
-        self._pending = []
+        self.pending = []
         if dead:
             alive = np.ones(len(self.rows.tree_id), np.bool_)
             alive[[row for row, _ in dead]] = False
@@ -196,7 +222,7 @@ class Stand:
             [(e.year, e.factor) for e in s.weather.extreme_years],
         )
         return Year(
-            step=self._step,
+            step=self.steps,
             seed=s.seed,
             income_factor=factor * s.site.productivity,
             full_light=self._full_light,
@@ -255,24 +281,24 @@ class Stand:
             )
         if self.scenario.plot.boundary == "periodic":
             at = at[0] % width, at[1] % depth
-        first = self._next_id
+        first = self.next_id
         self._plant(*at, np.array([known[name] for name in names], np.int16))
-        return list(range(first, self._next_id))
+        return list(range(first, self.next_id))
 
     def _plant(self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]) -> None:
         more = seedlings(
             x,
             y,
             species,
-            first_id=self._next_id,
-            step=self._step,
+            first_id=self.next_id,
+            step=self.steps,
             seed=self.scenario.seed,
-            voxel_m=self._surroundings.voxel_m,
+            voxel_m=self.surroundings.voxel_m,
             vigour_sd=np.array([s.carbon.vigour_sd for s in self.species]),
             seed_reserve_kg=np.array([s.carbon.seed_reserve_kg for s in self.species]),
         )
         first_row = len(self.rows.tree_id)
-        self._next_id += len(more.tree_id)
+        self.next_id += len(more.tree_id)
         self.rows = table.append(self.rows, more)
         rows = self.rows
         wanted = rows.size.astype(np.int64)
@@ -281,7 +307,7 @@ class Stand:
         sprout(self.arena.metamers, rows, first_row, self._traits, self._year())
         measures = self.measure()
         for row in range(first_row, len(rows.tree_id)):
-            self._pending.append(Event.of(self, row, "planted", "none", measures))
+            self.pending.append(Event.of(self, row, "planted", "none", measures))
 
     def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> None:
         """Fell trees: they are gone at once, with an event in the next year's record.
@@ -307,7 +333,7 @@ class Stand:
         alive = np.ones(len(self.rows.tree_id), np.bool_)
         for row in rows:
             if alive[row]:
-                self._pending.append(Event.of(self, row, "felled", cause, measures))
+                self.pending.append(Event.of(self, row, "felled", cause, measures))
             alive[row] = False
         self.rows = table.keep(self.rows, alive)
 
@@ -320,8 +346,8 @@ class Stand:
         measures = self.measure()
         kind = int(self.rows.species[row])
         branch_pipe = float(self._traits.of["branch_pipe"][kind])
-        gone = cut_branch(self.arena.metamers, self.rows, row, metamer, branch_pipe)
-        self._pending.append(Event.of(self, row, "pruned", "none", measures))
+        gone = cut_branch(self.arena, self.rows, row, metamer, branch_pipe)
+        self.pending.append(Event.of(self, row, "pruned", "none", measures))
         return gone
 
     # ------------------------------------------------------------------ what it is now
@@ -329,22 +355,12 @@ class Stand:
     @property
     def year(self) -> int:
         """The last complete calendar year."""
-        return self.scenario.start_year + self._step - 1
-
-    @property
-    def steps(self) -> int:
-        """Years grown so far."""
-        return self._step
-
-    @property
-    def pending(self) -> list[Event]:
-        """Events since the last record."""
-        return self._pending
+        return self.scenario.start_year + self.steps - 1
 
     @property
     def floor_light(self) -> float:
         """Mean relative irradiance on the ground, 0..1; NaN without a far field."""
-        return self._surroundings.floor_light()
+        return self.surroundings.floor_light()
 
     @property
     def pipe_exponent(self) -> NDArray[np.float64]:
@@ -353,7 +369,7 @@ class Stand:
 
     @property
     def _full_light(self) -> float:
-        return self._surroundings.full_light
+        return self.surroundings.full_light
 
     @property
     def trees(self) -> pd.DataFrame:
@@ -366,10 +382,9 @@ class Stand:
             "species": [self.species_names[k] for k in self.rows.species],
             "x_m": self.rows.x,
             "y_m": self.rows.y,
-            "age": self._step - self.rows.birth,
+            "age": self.steps - self.rows.birth,
         }
-        hidden = ("breast_serial", "breast_birth", "breast_radius_m")
-        columns.update({k: v for k, v in measures._asdict().items() if k not in hidden})
+        columns.update(measures.columns())
         return pd.DataFrame(columns)
 
     def measure(self) -> TreeMeasures:
@@ -378,15 +393,28 @@ class Stand:
             self.arena.metamers, self.rows, self.measured_species, self._full_light
         )
 
-    def skeleton(self, tree_id: int) -> Skeleton:
-        """The shape of a living tree."""
+    def skeleton(self, tree_id: int, season: Literal["summer", "winter"] = "summer") -> Skeleton:
+        """The shape of a living tree.
+
+        Parameters
+        ----------
+        tree_id : int
+            A living tree.
+        season : {"summer", "winter"}
+            Where trees bend: under its load of leaves and fruit, or as it springs up without
+            (Taylor-Hell 2005, 6.3).
+        """
         from forest.trees.skeleton import skeleton_of
 
         row = self.row_of(tree_id)
         kind = int(self.rows.species[row])
+        metamers, rows = self.arena.metamers, self.rows
+        if season == "winter" and self.mechanics is not None:
+            metamers, rows = self.mechanics.winter(self.arena, self.rows, row)
+            row = 0
         return skeleton_of(
-            self.arena.metamers,
-            self.rows,
+            metamers,
+            rows,
             row,
             species=self.species_names[kind],
             pipe_exponent=float(self.pipe_exponent[kind]),
@@ -418,23 +446,7 @@ class Stand:
 
     def state(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Everything that the next year needs: arrays, and a few numbers (JSON)."""
-        arrays = {f"tree_{name}": column for name, column in self.rows._asdict().items()}
-        spans = [
-            (int(s), int(s) + int(n)) for s, n in zip(self.rows.start, self.rows.size, strict=True)
-        ]
-        for name, field in self.arena.metamers._asdict().items():
-            parts = [field[a:b] for a, b in spans]
-            arrays[f"metamer_{name}"] = np.concatenate(parts) if parts else field[:0]
-        arrays.update(self._surroundings.state())
-        meta = {
-            "step": self._step,
-            "next_id": self._next_id,
-            "sample_ids": list(self.sample_ids),
-            "pending": [
-                [None if value != value else value for value in event] for event in self._pending
-            ],
-        }
-        return arrays, meta
+        return take_state(self)
 
     @classmethod
     def restore(
@@ -443,44 +455,5 @@ class Stand:
         """Build the stand that `state` was taken of."""
         stand = cls.__new__(cls)
         stand._start(scenario)
-        stand._step = int(meta["step"])
-        stand._next_id = int(meta["next_id"])
-        stand.sample_ids = [int(i) for i in meta["sample_ids"]]
-        stand._pending = [
-            Event._make(np.nan if value is None else value for value in event)
-            for event in meta["pending"]
-        ]
-        stand.rows = table.Trees(
-            **{name: np.array(arrays[f"tree_{name}"]) for name in table.Trees._fields}
-        )
-        rows = stand.rows
-        size = rows.size.copy()
-        rows.size[:] = 0
-        rows.room[:] = 0
-        stand.arena.make_room(rows.start, rows.size, rows.room, size.astype(np.int64))
-        at = 0
-        for row, n in enumerate(size):
-            s = int(rows.start[row])
-            for name, field in stand.arena.metamers._asdict().items():
-                field[s : s + n] = arrays[f"metamer_{name}"][at : at + n]
-            at += int(n)
-        rows.size[:] = size
-        stand._surroundings.restore(arrays)
+        put_state(stand, arrays, meta)
         return stand
-
-
-def _measure_species(stand: Stand) -> MeasureSpecies:
-    species = stand.species
-
-    def each(section: str, key: str, scale: float = 1.0) -> NDArray[np.float64]:
-        return np.array([scale * getattr(getattr(s, section), key) for s in species], np.float64)
-
-    return MeasureSpecies(
-        pipe_exponent=stand.pipe_exponent,
-        bark_factor=each("mensuration", "bark_factor"),
-        density_kg_m3=each("wood", "density_kg_m3"),
-        leaf_area_m2=each("leaves", "area_m2"),
-        sla_m2_kg=each("leaves", "sla_m2_kg"),
-        merchantable_top_m=each("mensuration", "merchantable_top_cm", 0.01),
-        stump_height_m=each("mensuration", "stump_height_m"),
-    )

@@ -11,7 +11,7 @@ from forest.growth import budget
 from forest.measure.rings import ring_rows, ring_widths
 from forest.measure.stand import Flows, Plot, stand_rows
 from forest.measure.trees import TreeMeasures
-from forest.record.samples import SampleYear
+from forest.record.samples import SampleShape, SampleYear
 from forest.record.schema import CAUSES, EVENT_KINDS
 from forest.trees import table
 from forest.trees.metamers import LATERAL, MAIN, TERMINAL
@@ -117,9 +117,13 @@ def record_year(
             stand.floor_light,
         ),
         "events": _event_rows(stand.year, events),
-        "rings": ring_rows(stand.year, stand.steps, living, of_living),
+        "rings": ring_rows(
+            stand.year, stand.steps, living, of_living, *_thick_sides(stand, living, of_living)
+        ),
         "carbon": _carbon_rows(stand, accounts),
     }
+    if stand.mechanics is not None:
+        tables["stability"] = _stability_rows(stand, living, of_living)
     return YearRecord(stand.year, tables, _sample_years(stand, dead, serials_before))
 
 
@@ -135,9 +139,33 @@ def _tree_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Colu
         "status": np.zeros(n, np.int8),
         "ring_width_mm": ring_widths(trees, measures),
     }
-    hidden = ("breast_serial", "breast_birth", "breast_radius_m")
-    columns.update({k: v for k, v in measures._asdict().items() if k not in hidden})
+    columns.update(measures.columns())
     return columns
+
+
+def _thick_sides(
+    stand: Stand, trees: table.Trees, measures: TreeMeasures
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | tuple[None, None]:
+    """Give eccentricity and thick side (degrees) of the rings at breast height."""
+    if stand.mechanics is None:
+        return None, None
+    place = trees.start + np.maximum(measures.breast_metamer, 0)
+    eccentricity, azimuth = stand.mechanics.thick_sides(stand.arena, place)
+    return eccentricity, np.degrees(azimuth) % 360.0
+
+
+def _stability_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Columns:
+    assert stand.mechanics is not None
+    tall = measures.height_m[measures.height_m > 0.0]
+    canopy_height = float(np.quantile(tall, 0.9)) if len(tall) else 0.0
+    found = stand.mechanics.stability(stand.arena, trees, canopy_height)
+    n = len(trees.tree_id)
+    return {
+        "year": np.full(n, stand.year, np.int32),
+        "tree_id": trees.tree_id,
+        "species": trees.species,
+        **found._asdict(),
+    }
 
 
 def _flows(events: list[Event], species: int) -> Flows:
@@ -238,12 +266,18 @@ def _sample_year(stand: Stand, row: int, known: NDArray[np.int32] | None, dies: 
     if dies:
         lost = np.union1d(lost, serial)
     here = np.zeros(n, np.bool_) if dies else np.ones(n, np.bool_)
+    end = (arena.tip[part] + base).astype(np.float32)
+    shape = None
+    if stand.mechanics is not None:
+        index = start + np.flatnonzero(here)
+        eccentricity, azimuth = stand.mechanics.thick_sides(stand.arena, index)
+        shape = SampleShape(end[here], eccentricity, np.degrees(azimuth) % 360.0)
     return SampleYear(
         species=int(rows.species[row]),
         base=base,
         new_serial=serial[new],
         new_parent_serial=parent_serial[new],
-        new_end=(arena.tip[part][new] + base).astype(np.float32),
+        new_end=end[new],
         new_order=arena.order[part][new],
         new_main=(state[new] & MAIN) != 0,
         new_birth_year=(arena.birth[part][new] + stand.scenario.start_year - 1).astype(np.int32),
@@ -251,4 +285,5 @@ def _sample_year(stand: Stand, row: int, known: NDArray[np.int32] | None, dies: 
         serial=serial[here],
         radius=(0.5 * arena.pipe[part][here] ** (1.0 / exponent)).astype(np.float32),
         leafy=(state[here] & (TERMINAL | LATERAL)) != 0,
+        shape=shape,
     )

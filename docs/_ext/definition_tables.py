@@ -2,7 +2,8 @@
 
 `{scenario-keys}` and `{species-keys}` list every key with unit, default, range and meaning;
 `{species-values}` sets the shipped species side by side, `{species-sources}` says where the values
-come from. `{run-file-columns}` lists the run file's tables. `{pictures}` shows the gallery.
+come from. `{run-file-columns}` lists the tables of the run file, `{interop-columns}` what they give
+to other programs. `{pictures}` shows the gallery.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 import forest
+from forest.interop.mapping import mapping_markdown
 from forest.record.schema import columns_markdown
 from forest.scenario import Scenario
 from forest.species import Species, describe, load_species, species_names
@@ -111,7 +113,7 @@ def _short(value: Any) -> str:
 def _directive(text: Any) -> type[SphinxDirective]:
     class Generated(SphinxDirective):
         def run(self) -> list[nodes.Node]:
-            for room in ("scenario", "species", "record"):
+            for room in ("scenario", "species", "record", "interop"):
                 for source in (Path(forest.__file__).parent / room).glob("*.*"):
                     self.env.note_dependency(str(source))
             self.env.note_dependency(str(Path(__file__).parents[1] / "gallery" / "captions.toml"))
@@ -129,5 +131,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("species-values", _directive(values_side_by_side))
     app.add_directive("species-sources", _directive(sources))
     app.add_directive("run-file-columns", _directive(columns_markdown))
+    app.add_directive("interop-columns", _directive(mapping_markdown))
     app.add_directive("pictures", _directive(pictures))
     return {"parallel_read_safe": True}

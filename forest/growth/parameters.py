@@ -78,7 +78,13 @@ TRAITS = (
     "offset_gain",
     "light_gain",
     "offset_length",
+    "fresh_wood",
+    "fresh_leaf",
+    "sag",
 )
+
+#: Standard gravity, m/s2.
+_GRAVITY = 9.80665
 
 
 class SpeciesTraits(NamedTuple):
@@ -117,10 +123,13 @@ class Year(NamedTuple):
     balance: bool = False
 
 
-def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
+def species_traits(
+    species: Sequence[Species], *, paper: bool, bending: bool = False
+) -> SpeciesTraits:
     """Pack the species' parameters for the kernels.
 
-    In mass-balance mode pipes add by area, whatever the species' pipe exponent.
+    In mass-balance mode pipes add by area, whatever the species' pipe exponent. Where trees bend,
+    `sag` is d^4 per fresh mass and squared distance that keeps limbs from sagging, m2/kg; else 0.
     """
 
     def each(section: str, key: str, scale: float = 1.0) -> NDArray[np.float64]:
@@ -149,6 +158,7 @@ def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
             for j, (x, y) in enumerate(curve):
                 curve_x[row, k, j] = x
                 curve_y[row, k, j] = y
+    stiffness = each("mechanics", "modulus_juvenile_gpa", 1e9) * each("mechanics", "sag_limit_rad")
     hydraulic = each("carbon", "hydraulic_length_m")
     values = {
         "internode_length": each("architecture", "internode_length_m"),
@@ -195,6 +205,9 @@ def species_traits(species: Sequence[Species], *, paper: bool) -> SpeciesTraits:
         "offset_gain": each("balance", "offset_gain"),
         "light_gain": each("balance", "light_gain"),
         "offset_length": each("balance", "offset_length_factor"),
+        "fresh_wood": each("mechanics", "green_density_kg_m3") / each("wood", "density_kg_m3"),
+        "fresh_leaf": each("mechanics", "leaf_water_factor"),
+        "sag": 64.0 * _GRAVITY / np.pi / stiffness if bending else np.zeros(len(species)),
     }
     of = np.zeros(len(species), [(name, np.float64) for name in TRAITS])
     for name in TRAITS:

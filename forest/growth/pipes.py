@@ -44,19 +44,27 @@ def add_pipes(parent, birth, step, pipe, strand, flow):  # type: ignore[no-untyp
 
 
 @njit
-def reinforce(parent, length, pipe, wood, leaf_mass, state, budget, mass, lack):  # type: ignore[no-untyped-def]
-    """Thicken first what is thinner than its load needs (Hart & Baker 2003, eqs 6, 7, 10, 18).
+def reinforce(parent, length, pipe, state, wood, fresh, budget, work):  # type: ignore[no-untyped-def]
+    """Thicken first what is thinner than its load needs.
 
-    needs_to_support(M, d) = sqrt(M / (k d)), asked of every metamer for the mass it carries.
+    Every metamer must support the mass that it carries: needs_to_support(M, d) = sqrt(M / (k d))
+    (Hart & Baker 2003, eqs 6, 7, 10, 18). Where trees bend, no limb may sag too far either: with
+    the weight W beyond a metamer, at the distance h along the limb, the tip of the level limb turns
+    by W h^2 / E I, which elastic similarity keeps the same for limbs of all sizes (McMahon &
+    Kronauer 1976).
 
     Parameters
     ----------
-    wood : (density, support)
-        d, kg/m3; k, m.
+    wood : (density, support, leaf_mass)
+        d, kg/m3; k, m; dry mass of a site's leaves, kg.
+    fresh : (wood, leaf, sag)
+        Fresh per dry mass of wood and of leaves; d^4 per fresh mass and squared distance that
+        keeps the sag at its limit, m2/kg; 0 where trees do not bend.
     budget : float
         Dry mass at hand, kg; the reinforcement is scaled down to it.
-    mass, lack : float64 (n,)
-        Scratch: mass supported, kg; missing d^2, m2.
+    work : float64 (4, n)
+        Scratch: dry mass supported, kg; missing d^2, m2; fresh mass, and its moment about the
+        metamer's upper end, kg m.
 
     Returns
     -------
@@ -64,17 +72,29 @@ def reinforce(parent, length, pipe, wood, leaf_mass, state, budget, mass, lack):
         Dry mass laid down, kg.
     """
     n = len(parent)
-    density, support = wood
+    density, support, leaf_mass = wood
+    fresh_wood, fresh_leaf, sag = fresh
+    mass, lack, weight, moment = work[0], work[1], work[2], work[3]
     volume = 0.25 * np.pi * density
     for i in range(n):
         s = state[i]
-        sites = (1 if s & TERMINAL else 0) + (1 if s & LATERAL else 0)
-        mass[i] = volume * np.float64(pipe[i]) * np.float64(length[i]) + sites * leaf_mass
+        leaves = ((1 if s & TERMINAL else 0) + (1 if s & LATERAL else 0)) * leaf_mass
+        dry = volume * np.float64(pipe[i]) * np.float64(length[i])
+        mass[i] = dry + leaves
+        weight[i] = fresh_wood * dry + fresh_leaf * leaves
+        moment[i] = -0.5 * np.float64(length[i]) * fresh_wood * dry
     for i in range(n - 1, 0, -1):
-        mass[parent[i]] += mass[i]
+        p = parent[i]
+        mass[p] += mass[i]
+        if sag > 0.0:
+            weight[p] += weight[i]
+            moment[p] += moment[i] + weight[i] * np.float64(length[i])
     cost = 0.0
     for i in range(n):
         needed = 4.0 * mass[i] / (support * density)
+        if sag > 0.0 and weight[i] > 0.0:
+            turning = max(moment[i] + weight[i] * np.float64(length[i]), 0.0)
+            needed = max(needed, np.sqrt(sag / weight[i]) * turning)
         lack[i] = max(0.0, needed - np.float64(pipe[i]))
         cost += volume * lack[i] * np.float64(length[i])
     if cost <= 0.0:
@@ -165,10 +185,9 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work, ints):  # type
     for i in range(n):
         total += surplus[i]
     rest = max(accounts[row, SPEND] - extension, 0.0)
-    wood = (t.of[sp].density, t.of[sp].support)
-    support = reinforce(
-        parent, length, pipe, wood, t.of[sp].leaf_mass, state, rest, work[4], work[5]
-    )
+    wood = (t.of[sp].density, t.of[sp].support, t.of[sp].leaf_mass)
+    fresh = (t.of[sp].fresh_wood, t.of[sp].fresh_leaf, t.of[sp].sag)
+    support = reinforce(parent, length, pipe, state, wood, fresh, rest, work[4:8])
     ring = rest - support
     if total > 0.0:
         per_surplus = ring / (volume * total)

@@ -13,7 +13,7 @@ from forest._threads import in_threads
 from forest.growth.bud_fate import lit_buds
 from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
 from forest.growth.parameters import SpeciesTraits
-from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
+from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, MAIN, TERMINAL, Arena, close_ranks
 from forest.trees.table import Trees
 
 
@@ -84,43 +84,7 @@ def mark_shed(  # type: ignore[no-untyped-def]
 
 
 @njit
-def close_ranks(arena: Metamers, start, n, gone, new_index):  # type: ignore[no-untyped-def]
-    """Compact a tree inside its extent: move what stays to the front, in order.
-
-    Returns the number of metamers that stay.
-    """
-    kept = 0
-    for i in range(n):
-        if gone[i]:
-            new_index[i] = -1
-            continue
-        new_index[i] = kept
-        if kept != i:
-            a = start + i
-            b = start + kept
-            p = arena.parent[a]
-            arena.parent[b] = new_index[p] if p >= 0 else -1
-            arena.serial[b] = arena.serial[a]
-            for k in range(3):
-                arena.tip[b, k] = arena.tip[a, k]
-                arena.bud[b, k] = arena.bud[a, k]
-            arena.length[b] = arena.length[a]
-            arena.pipe[b] = arena.pipe[a]
-            arena.sapwood[b] = arena.sapwood[a]
-            arena.light[b] = arena.light[a]
-            arena.resource[b, 0] = arena.resource[a, 0]
-            arena.resource[b, 1] = arena.resource[a, 1]
-            arena.birth[b] = arena.birth[a]
-            arena.order[b] = arena.order[a]
-            arena.state[b] = arena.state[a]
-            arena.deficit[b] = arena.deficit[a]
-            arena.shoot_height[b] = arena.shoot_height[a]
-        kept += 1
-    return kept
-
-
-@njit
-def _shed_tree(arena, trees, row, t, drop_bare, work, ints):  # type: ignore[no-untyped-def]
+def _shed_tree(arena, fields, trees, row, t, drop_bare, work, ints):  # type: ignore[no-untyped-def]
     """Drop the poor and bare branches of one tree."""
     sp = trees.species[row]
     s = trees.start[row]
@@ -140,11 +104,11 @@ def _shed_tree(arena, trees, row, t, drop_bare, work, ints):  # type: ignore[no-
         ints,
     )
     if gone > 0:
-        trees.size[row] = close_ranks(arena, s, n, ints[2], ints[0])
+        trees.size[row] = close_ranks(arena.parent[s:e], fields, s, n, ints[2], ints[0])
 
 
 @driver
-def _shed_chunks(first, step, arena, trees, shared, scratch, traits, drop_bare):  # type: ignore[no-untyped-def]
+def _shed_chunks(first, step, arena, fields, trees, shared, scratch, traits, drop_bare):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
@@ -153,11 +117,11 @@ def _shed_chunks(first, step, arena, trees, shared, scratch, traits, drop_bare):
             g = shared.place[b] * INTEGERS
             work = scratch.floats[f : f + FLOATS * n].reshape((FLOATS, n))
             ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
-            _shed_tree(arena, trees, row, traits, drop_bare, work, ints)
+            _shed_tree(arena, fields, trees, row, traits, drop_bare, work, ints)
 
 
 def shed(
-    arena: Metamers,
+    arena: Arena,
     trees: Trees,
     shared: Deal,
     scratch: Scratch,
@@ -165,4 +129,6 @@ def shed(
     drop_bare: bool,
 ) -> None:
     """Drop the branches of all trees that earn too little, and compact what stays."""
-    in_threads(_shed_chunks, arena, trees, shared, scratch, traits, drop_bare)
+    in_threads(
+        _shed_chunks, arena.metamers, arena.fields, trees, shared, scratch, traits, drop_bare
+    )

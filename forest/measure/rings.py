@@ -38,7 +38,12 @@ def remember_breast(trees: Trees, measures: TreeMeasures) -> None:
 
 
 def ring_rows(
-    year: int, step: int, trees: Trees, measures: TreeMeasures
+    year: int,
+    step: int,
+    trees: Trees,
+    measures: TreeMeasures,
+    eccentricity: NDArray[np.float64] | None = None,
+    thick_side_deg: NDArray[np.float64] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Give this year's rows of the ring table, one for each tree that reaches 1.3 m.
 
@@ -52,12 +57,13 @@ def ring_rows(
         As at the end of last year (see `ring_widths`); call `remember_breast` afterwards.
     measures : TreeMeasures
         This year's, of the same trees.
+    eccentricity, thick_side_deg : float64 (trees,), optional
+        Of the ring at breast height; circles without them.
 
     Returns
     -------
     dict of arrays
-        `cambial_age` is 1 in the year in which the stem's metamer at 1.3 m was made. Rings are
-        circles here: `eccentricity` is 0 and `thick_side_deg` is NaN.
+        `cambial_age` is 1 in the year in which the stem's metamer at 1.3 m was made.
     """
     width = ring_widths(trees, measures)
     has = np.flatnonzero(~np.isnan(width))
@@ -69,6 +75,6 @@ def ring_rows(
         "stem_height_m": np.full(n, BREAST_HEIGHT_M),
         "cambial_age": (step - measures.breast_birth[has] + 1).astype(np.int32),
         "width_mm": width[has],
-        "eccentricity": np.zeros(n),
-        "thick_side_deg": np.full(n, np.nan),
+        "eccentricity": np.zeros(n) if eccentricity is None else eccentricity[has],
+        "thick_side_deg": np.full(n, np.nan) if thick_side_deg is None else thick_side_deg[has],
     }

@@ -11,13 +11,15 @@ A node bears one lateral bud, so that branch is the only one, and one forward sc
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import driver, njit
 from forest._threads import in_threads
+from forest.species import Species
 from forest.trees.metamers import CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
 
@@ -40,6 +42,24 @@ class MeasureSpecies(NamedTuple):
     merchantable_top_m: NDArray[np.float64]  # smallest diameter over bark that is sold
     stump_height_m: NDArray[np.float64]
 
+    @classmethod
+    def of(cls, species: Sequence[Species], pipe_exponent: NDArray[np.float64]) -> Self:
+        """Read the species; the exponent is that of the run."""
+
+        def each(section: str, key: str, scale: float = 1.0) -> NDArray[np.float64]:
+            values = [scale * getattr(getattr(s, section), key) for s in species]
+            return np.array(values, np.float64)
+
+        return cls(
+            pipe_exponent=pipe_exponent,
+            bark_factor=each("mensuration", "bark_factor"),
+            density_kg_m3=each("wood", "density_kg_m3"),
+            leaf_area_m2=each("leaves", "area_m2"),
+            sla_m2_kg=each("leaves", "sla_m2_kg"),
+            merchantable_top_m=each("mensuration", "merchantable_top_cm", 0.01),
+            stump_height_m=each("mensuration", "stump_height_m"),
+        )
+
 
 class TreeMeasures(NamedTuple):
     """Measured trees: arrays of one entry per row of the tree table."""
@@ -59,9 +79,15 @@ class TreeMeasures(NamedTuple):
     light: NDArray[np.float64]  # mean relative light of the living sites; NaN without one
     metamers: NDArray[np.int32]
     buds: NDArray[np.int32]  # living sites
-    breast_serial: NDArray[np.int32]  # metamer at breast height; -1 while there is none
+    breast_metamer: NDArray[np.int32]  # metamer at breast height, in the tree's extent; or -1
+    breast_serial: NDArray[np.int32]  # its serial; -1 while there is none
     breast_birth: NDArray[np.int32]  # step in which that metamer was made; -1 while there is none
     breast_radius_m: NDArray[np.float32]  # under bark at breast height; 0 while there is none
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Give what is measured, by column, without what only helps to find breast height."""
+        named = self._asdict().items()
+        return {name: column for name, column in named if not name.startswith("breast_")}
 
 
 @njit
@@ -170,6 +196,7 @@ def _measure_tree(
     if breast < 0:
         out.dbh_cm[t] = _NAN
         out.basal_area_m2[t] = 0.0
+        out.breast_metamer[t] = -1
         out.breast_serial[t] = -1
         out.breast_birth[t] = -1
         out.breast_radius_m[t] = 0.0
@@ -178,6 +205,7 @@ def _measure_tree(
         dbh = under * over_bark
         out.dbh_cm[t] = 100.0 * dbh
         out.basal_area_m2[t] = _QUARTER_PI * dbh * dbh
+        out.breast_metamer[t] = breast
         out.breast_serial[t] = metamers.serial[first + breast]
         out.breast_birth[t] = metamers.birth[first + breast]
         out.breast_radius_m[t] = 0.5 * under
@@ -234,7 +262,7 @@ def measure_trees(
     """
     n = len(trees.tree_id)
     columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in TreeMeasures._fields}
-    for name in ("metamers", "buds", "breast_serial", "breast_birth"):
+    for name in ("metamers", "buds", "breast_metamer", "breast_serial", "breast_birth"):
         columns[name] = np.empty(n, np.int32)
     columns["breast_radius_m"] = np.empty(n, np.float32)
     out = TreeMeasures(**columns)

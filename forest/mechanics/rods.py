@@ -112,12 +112,9 @@ def _grown_heading(tip, i, p):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _frame_tree(parent, birth, tip, length, rods, step, tropism, stiffness):  # type: ignore[no-untyped-def]
-    """Give the metamers of this step, the last of a tree, their frames; see `frame_new`."""
+def _frame_tree(parent, begin, tip, length, rods, tropism, stiffness):  # type: ignore[no-untyped-def]
+    """Give the metamers of a tree from `begin` on their frames; see `frame_new`."""
     n = len(parent)
-    begin = n
-    while begin > 0 and birth[begin - 1] == step:
-        begin -= 1
     for i in range(begin, n):
         p = np.int64(parent[i])
         h = _grown_heading(tip, i, p)
@@ -152,9 +149,14 @@ def _frame_chunks(first, step, arena, trees, shared, rods, year, tropism, stiffn
             s = trees.start[row]
             e = s + trees.size[row]
             sp = trees.species[row]
+            begin = np.int64(trees.size[row])
+            while begin > 0 and arena.birth[s + begin - 1] == year:
+                begin -= 1
+            if trees.birth[row] >= year - 1:  # planted since the last step: all of it is new
+                begin = np.int64(0)
             _frame_tree(
                 arena.parent[s:e],
-                arena.birth[s:e],
+                begin,
                 arena.tip[s:e],
                 arena.length[s:e],
                 Rods(
@@ -165,7 +167,6 @@ def _frame_chunks(first, step, arena, trees, shared, rods, year, tropism, stiffn
                     rods.frame[s:e],
                     rods.ringed[s:e],
                 ),
-                year,
                 (tropism[sp, 0], tropism[sp, 1], tropism[sp, 2]),
                 (stiffness[sp, 0], stiffness[sp, 1], stiffness[sp, 2]),
             )
@@ -180,7 +181,7 @@ def frame_new(
     tropism: NDArray[np.float64],
     stiffness: NDArray[np.float64],
 ) -> None:
-    """Make rods of the metamers that grew in this step.
+    """Make rods of the metamers that grew in this step, and of trees planted just before it.
 
     The joint is the smallest rotation from the heading of the parent's end to the direction in
     which the metamer grew (it replaces divergence and deviation, Taylor-Hell 2005, section 5.1),

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from forest.errors import InputError, OutputError
 from forest.record.run import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _SUFFIXES = (".csv", ".parquet")
 
@@ -37,28 +43,57 @@ def export(run: Run, table: str, to: str | Path, *, overwrite: bool = False) -> 
     OutputError
         If it cannot be written. Nothing half-written is left behind.
     """
-    to = Path(to)
-    suffix = to.suffix.lower()
+    write_frame(lambda: run.read(table), to, overwrite=overwrite)
+    return Path(to)
+
+
+def write_frame(
+    make: Callable[[], pd.DataFrame], to: str | Path, *, overwrite: bool = False
+) -> int:
+    """Write a frame as `export` does; it is made when the path is known to be good.
+
+    Returns
+    -------
+    int
+        Number of its rows.
+    """
+    suffix = Path(to).suffix.lower()
     if suffix not in _SUFFIXES:
         expected = f"a name that ends in {' or '.join(_SUFFIXES)}"
         raise InputError(f"unknown format '{suffix}'", where=str(to), expected=expected)
+    with whole_file(to, overwrite=overwrite) as draft:
+        frame = make()
+        if suffix == ".csv":
+            frame.to_csv(draft, index=False)
+        else:
+            frame.to_parquet(draft, index=False)
+    return len(frame)
+
+
+@contextmanager
+def whole_file(to: str | Path, *, overwrite: bool) -> Iterator[Path]:
+    """Give the path of a draft that becomes the file when it is done, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file exists and must not be replaced, or is a folder.
+    OutputError
+        If it cannot be written.
+    """
+    to = Path(to)
     if to.is_dir():
         raise InputError("is a folder", where=str(to), expected="the path of a file")
     if to.exists() and not overwrite:
         raise InputError("exists already", where=str(to), expected="a new path")
-    frame = run.read(table)
     try:
         # A folder of its own: the draft keeps the suffix, and the rights are the usual ones.
         with tempfile.TemporaryDirectory(prefix=f".{to.name}.", dir=to.parent) as folder:
             draft = Path(folder) / to.name
-            if suffix == ".csv":
-                frame.to_csv(draft, index=False)
-            else:
-                frame.to_parquet(draft, index=False)
+            yield draft
             draft.replace(to)
     except OSError as error:
         raise OutputError.of(error, to) from error
-    return to
 
 
 def info(run: Run) -> list[tuple[str, str]]:

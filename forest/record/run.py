@@ -109,6 +109,11 @@ class Run:
         return self._frame("carbon")
 
     @property
+    def stability(self) -> pd.DataFrame:
+        """A row per tree and year, where the scenario has mechanics: how safely trees stand."""
+        return self._frame("stability")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")
@@ -293,7 +298,11 @@ class Run:
         by_serial = np.argsort(metamers["serial"])
         rows = by_serial[np.searchsorted(metamers["serial"], living, sorter=by_serial)]
         parent = _places(living, metamers["parent_serial"][rows])
-        end = np.stack([metamers[f"end_{axis}_m"][rows] for axis in "xyz"], axis=1)
+        bent = slice(*(int(group["steps/shapes"][k]) if k >= 0 else 0 for k in (step - 1, step)))
+        if bent.stop > bent.start:
+            end = np.stack([group[f"shapes/end_{axis}_m"][bent] for axis in "xyz"], axis=1)
+        else:
+            end = np.stack([metamers[f"end_{axis}_m"][rows] for axis in "xyz"], axis=1)
         end = end.astype(np.float64)
         start = np.where(parent[:, None] >= 0, end[parent], group.attrs["base_m"])
         return Skeleton(

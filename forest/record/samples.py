@@ -14,6 +14,15 @@ from forest.record.schema import SAMPLE_TABLES
 
 _CHUNK = 4096
 _CHUNKS = {"steps": 128}
+_GROWING = ("metamers", "dead", "radii", "shapes")
+
+
+class SampleShape(NamedTuple):
+    """Where a sample tree's metamers stand in a year, and how its rings lie."""
+
+    end: NDArray[np.float32]  # (n, 3) upper ends, m, from the plot's corner
+    eccentricity: NDArray[np.float64]  # (n,)
+    thick_side_deg: NDArray[np.float64]  # (n,) azimuth; NaN where the ring is round
 
 
 class SampleYear(NamedTuple):
@@ -34,6 +43,7 @@ class SampleYear(NamedTuple):
     serial: NDArray[np.int32]  # (n,) all living metamers, new ones included
     radius: NDArray[np.float32]  # (n,) under bark, m
     leafy: NDArray[np.bool_]  # (n,)
+    shape: SampleShape | None = None  # of the same metamers; None where nothing bends
 
 
 class SampleStore:
@@ -56,7 +66,7 @@ class SampleStore:
             tables = self._trees[tree_id]
             for name, columns in _columns(year, sample).items():
                 tables[name].append(columns)
-            rows = {name: tables[name].rows for name in ("metamers", "dead", "radii")}
+            rows = {name: tables[name].rows for name in _GROWING}
             step = {"year": year, **rows}
             tables["steps"].append({name: np.array([value]) for name, value in step.items()})
 
@@ -68,7 +78,7 @@ class SampleStore:
             if known == 0:
                 del self._group[str(tree_id)], self._trees[tree_id]
                 continue
-            for name in ("metamers", "dead", "radii"):
+            for name in _GROWING:
                 tables[name].trim(int(steps.read(name)[known - 1]))
             steps.trim(known)
 
@@ -84,7 +94,7 @@ class SampleStore:
 
 def _columns(year: int, sample: SampleYear) -> dict[str, dict[str, NDArray[Any]]]:
     """Sort a year of a tree's life into the sample tables."""
-    return {
+    columns: dict[str, dict[str, NDArray[Any]]] = {
         "metamers": {
             "serial": sample.new_serial,
             "parent_serial": sample.new_parent_serial,
@@ -101,3 +111,12 @@ def _columns(year: int, sample: SampleYear) -> dict[str, dict[str, NDArray[Any]]
         },
         "radii": {"serial": sample.serial, "radius_m": sample.radius, "leafy": sample.leafy},
     }
+    if sample.shape is not None:
+        columns["shapes"] = {
+            "end_x_m": sample.shape.end[:, 0],
+            "end_y_m": sample.shape.end[:, 1],
+            "end_z_m": sample.shape.end[:, 2],
+            "eccentricity": sample.shape.eccentricity,
+            "thick_side_deg": sample.shape.thick_side_deg,
+        }
+    return columns

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 FILE_TYPE = "forest run"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 STATUS = ("living", "dead")
 EVENT_KINDS = ("planted", "recruited", "died", "felled", "pruned", "windthrown")
@@ -205,6 +205,23 @@ CARBON = Table(
     ),
 )
 
+STABILITY = Table(
+    "a tree and year, where the scenario has mechanics",
+    (
+        _YEAR,
+        _TREE,
+        _SPECIES,
+        _number("safety_factor", "", "load at which the stem buckles per load (Greenhill)"),
+        _number("critical_height_m", "m", "height at which a stem of this shape buckles"),
+        _number("frequency_hz", "Hz", "first frequency at which the stem sways"),
+        _number("stress_share", "0..1", "largest stress of own weight per modulus of rupture"),
+        _number("stress_height_m", "m", "height along the stem where it is"),
+        _number("wind_stress_share", "0..1", "the same with the scenario's wind; 1 breaks"),
+        _number("wind_stress_height_m", "m", "height along the stem where it is"),
+        _number("base_moment_nm", "N m", "bending moment at the base, of weight and wind"),
+    ),
+)
+
 POPULATION = Table(
     "a year: the ledger of the living",
     (
@@ -226,6 +243,7 @@ TABLES: dict[str, Table] = {
     "events": EVENTS,
     "rings": RINGS,
     "carbon": CARBON,
+    "stability": STABILITY,
 }
 
 #: The tables that a run file may hold.
@@ -260,6 +278,20 @@ SAMPLE_TABLES: dict[str, Table] = {
             Column("leafy", "uint8", "", "1 if a living leaf-bearing site stands at its end"),
         ),
     ),
+    "shapes": Table(
+        "a row of `radii`, where the scenario has mechanics",
+        (
+            Column("end_x_m", "float32", "m", "its upper end then, from the plot's corner"),
+            Column("end_y_m", "float32", "m", "its upper end then, from the plot's corner"),
+            Column("end_z_m", "float32", "m", "its upper end then, above the ground"),
+            _number("eccentricity", "0..1", "how far off-centre its ring of the year is"),
+            _number(
+                "thick_side_deg",
+                "degrees",
+                "azimuth of the ring's thick side, from x towards y, once the metamer is upright",
+            ),
+        ),
+    ),
     "steps": Table(
         "a year of the tree's life on record",
         (
@@ -267,6 +299,7 @@ SAMPLE_TABLES: dict[str, Table] = {
             Column("metamers", "int64", "", "rows of `metamers` up to its end"),
             Column("dead", "int64", "", "rows of `dead` up to its end"),
             Column("radii", "int64", "", "rows of `radii` up to its end"),
+            Column("shapes", "int64", "", "rows of `shapes` up to its end"),
         ),
     ),
 }

@@ -17,7 +17,7 @@ _Spacing = Annotated[float, Field(ge=0.05, le=10000)]
 _Extent = Annotated[float, Field(gt=0, le=1e5)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
-_TableName = Literal["trees", "stand", "events", "rings", "carbon"]
+_TableName = Literal["trees", "stand", "events", "rings", "carbon", "stability"]
 
 
 class Plot(Table):
@@ -74,6 +74,28 @@ class Growth(Table):
         "4.2), or by the growth rates that keep the tree in balance, within what its limbs can "
         "support (Hart and Baker 2003, 4.1)",
         unit="",
+    )
+
+
+class Mechanics(Table):
+    """How trees bend and stand; nothing bends where this table is not given."""
+
+    bending: bool = quantity(
+        True,
+        "branches and stems bend under their weight, and rings keep the shape (Taylor-Hell 2005)",
+        unit="",
+    )
+    righting: Literal["strain", "beta", "none"] = quantity(
+        "strain",
+        "how reaction wood rights what leans: by the strain with which it matures, by rest "
+        "curvature as printed (Taylor-Hell 2005, eq. 19), or not at all",
+        unit="",
+    )
+    tolerance_rad: float = quantity(
+        1e-4, "turn of a metamer that may be left to equilibrium", unit="rad", ge=1e-9, le=0.1
+    )
+    wind_m_s: float = quantity(
+        0.0, "wind at the canopy's top for which stresses are told", unit="m/s", ge=0, le=100
     )
 
 
@@ -341,7 +363,10 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        ("trees", "stand", "events", "rings", "carbon"), "tables to write", unit="", max_length=5
+        ("trees", "stand", "events", "rings", "carbon", "stability"),
+        "tables to write; stability only has rows where there is a table mechanics",
+        unit="",
+        max_length=6,
     )
     sample_trees: SampleTrees = SampleTrees()
     checkpoint_every_years: int = quantity(

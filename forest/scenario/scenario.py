@@ -20,6 +20,7 @@ from forest.scenario.model import (
     Environment,
     Explicit,
     Growth,
+    Mechanics,
     Obstacle,
     Output,
     Planting,
@@ -73,6 +74,7 @@ class Scenario(Table):
     site: Site = Site()
     weather: Weather = Weather()
     growth: Growth = Growth()
+    mechanics: Mechanics | None = None
     environment: Environment
     species: dict[str, SpeciesUse] = quantity(
         ...,

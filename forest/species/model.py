@@ -278,6 +278,9 @@ class Mechanics(Table):
     fruit_mass_kg: float = quantity(
         0.0, "fresh mass of the fruit at a living site in summer", unit="kg", ge=0, le=10
     )
+    drag_coefficient: float = quantity(
+        0.3, "drag of the crown per frontal area, before leaves stream with the wind", ge=0, le=2
+    )
     tropic_force_n: float = quantity(
         0.0,
         "force that turns a new metamer upwards (F_tropic, eq. 4); 0 = off",
@@ -313,6 +316,14 @@ class Mechanics(Table):
     )
     ring_swell: float = quantity(
         1.5, "width of a reaction ring along the bending direction per width across it", ge=1, le=2
+    )
+    sag_limit_rad: float = quantity(
+        0.3,
+        "turn by which a level limb may sag at its tip; what would sag more is thickened first "
+        "where trees bend, in mass-balance mode (elastic similarity, McMahon and Kronauer 1976)",
+        unit="rad",
+        gt=0,
+        le=10,
     )
     deviation_limit_rad_m: float = quantity(
         0.05,

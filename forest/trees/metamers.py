@@ -8,12 +8,13 @@ basipetal pass is one backward scan and an acropetal pass one forward scan.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import driver, move_bytes
+from forest._jit import driver, move_bytes, njit
 from forest._threads import in_threads
 
 # Bits of Metamers.state
@@ -75,16 +76,82 @@ def allocate(capacity: int) -> Metamers:
     return Metamers(**arrays)
 
 
+class Fields(NamedTuple):
+    """Where the arena's arrays lie, to move metamers whatever is known of them.
+
+    Attributes
+    ----------
+    address : int64 (fields,)
+        Address of each array.
+    width : int64 (fields,)
+        Its bytes per metamer.
+    """
+
+    address: NDArray[np.int64]
+    width: NDArray[np.int64]
+
+
 @driver
-def _move_fields(first, step, address, width, source, to, size):  # type: ignore[no-untyped-def]
-    """Move extents in every field; fields are told by their address and bytes per metamer."""
-    for field in range(first, len(address), step):
+def _move_extents(first, step, fields, source, to, size):  # type: ignore[no-untyped-def]
+    """Move extents, one after the other, in every field."""
+    for field in range(first, len(fields.address), step):
+        width = fields.width[field]
         for k in range(len(source)):
             move_bytes(
-                address[field] + to[k] * width[field],
-                address[field] + source[k] * width[field],
-                np.int64(size[k]) * width[field],
+                fields.address[field] + to[k] * width,
+                fields.address[field] + source[k] * width,
+                np.int64(size[k]) * width,
             )
+
+
+@njit
+def close_ranks(parent, fields, start, n, gone, new_index):  # type: ignore[no-untyped-def]
+    """Compact a tree inside its extent: move what stays to the front, in order.
+
+    Parameters
+    ----------
+    parent : int32 (n,)
+        The tree's part of `Metamers.parent`.
+    fields : Fields
+    start, n : int
+        First metamer of the tree and metamers in use.
+    gone : array (n,)
+        Not 0 where a metamer goes; its children go as well.
+    new_index : int32 (n,)
+        Filled: where each metamer stands now, relative to the tree's extent; -1 if it is gone.
+
+    Returns
+    -------
+    int
+        Metamers that stay.
+    """
+    kept = 0
+    for i in range(n):
+        new_index[i] = -1 if gone[i] else kept
+        if not gone[i]:
+            kept += 1
+            if parent[i] >= 0:
+                parent[i] = new_index[parent[i]]
+    to = 0
+    i = 0
+    while i < n:
+        if gone[i]:
+            i += 1
+            continue
+        end = i
+        while end < n and not gone[end]:
+            end += 1
+        if to != i:
+            for field in range(len(fields.address)):
+                width = fields.width[field]
+                move_bytes(
+                    fields.address[field] + (start + to) * width,
+                    fields.address[field] + (start + i) * width,
+                    (end - i) * width,
+                )
+        to += end - i
+        i = end
+    return kept
 
 
 class Arena:
@@ -92,6 +159,14 @@ class Arena:
 
     `used` is the end of the last extent. Extents are handed out at the end; when the end is
     reached, `make_room` closes the holes and, only if that is not enough, grows the arrays.
+
+    Parameters
+    ----------
+    capacity : int
+        Metamers that the arrays hold at first.
+    companions : callable, optional
+        Makes a NamedTuple of further arrays, one entry per metamer, for a given capacity; they are
+        kept in `companions` and move with the metamers. They exist where a scenario asks for them.
     """
 
     #: Slack left behind a tree when it is placed, as a share of its size.
@@ -99,9 +174,21 @@ class Arena:
     #: Growth of the arrays when they are full.
     GROWTH = 1.15
 
-    def __init__(self, capacity: int = 4096) -> None:
+    def __init__(
+        self, capacity: int = 4096, companions: Callable[[int], Any] | None = None
+    ) -> None:
         self.metamers = allocate(max(capacity, 16))
+        self.companions: Any = companions(self.capacity) if companions else ()
         self.used = 0
+
+    @property
+    def fields(self) -> Fields:
+        """Where all arrays lie now."""
+        arrays = (*self.metamers, *self.companions)
+        return Fields(
+            np.array([array.ctypes.data for array in arrays], np.int64),
+            np.array([array.nbytes // len(array) for array in arrays], np.int64),
+        )
 
     @property
     def capacity(self) -> int:
@@ -141,10 +228,7 @@ class Arena:
     def _move(
         self, source: NDArray[np.int64], to: NDArray[np.int64], size: NDArray[np.int32]
     ) -> None:
-        """Move extents one after the other; each field by one thread."""
-        address = np.array([field.ctypes.data for field in self.metamers], np.int64)
-        width = np.array([field.nbytes // self.capacity for field in self.metamers], np.int64)
-        in_threads(_move_fields, address, width, source, to, size)
+        in_threads(_move_extents, self.fields, source, to, size)
 
     def _repack(
         self,
@@ -176,13 +260,14 @@ class Arena:
 
     def _grow(self, capacity: int, used: int) -> None:
         """Grow field by field, so that at most one field is held twice."""
-        grown: dict[str, NDArray[Any]] = {}
-        old = self.metamers._asdict()
-        del self.metamers
-        for name in list(old):
-            field = old.pop(name)
-            new = np.empty((capacity, *field.shape[1:]), field.dtype)
-            new[:used] = field[:used]
-            grown[name] = new
-            del field
-        self.metamers = Metamers(**grown)
+        metamers: list[Any] = list(self.metamers)
+        companions: list[Any] = list(self.companions)
+        kind = type(self.companions)
+        del self.metamers, self.companions
+        for fields in (metamers, companions):
+            for k in range(len(fields)):
+                new = np.empty((capacity, *fields[k].shape[1:]), fields[k].dtype)
+                new[:used] = fields[k][:used]
+                fields[k] = new
+        self.metamers = Metamers(*metamers)
+        self.companions = kind(*companions)

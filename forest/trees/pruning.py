@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from forest.errors import InputError
-from forest.trees.metamers import BRANCHED, CONTINUED, MAIN, Metamers
+from forest.trees.metamers import BRANCHED, CONTINUED, MAIN, Arena, close_ranks
 from forest.trees.table import Trees
 
 
-def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int, branch_pipe: float) -> int:
+def cut_branch(place: Arena, trees: Trees, row: int, serial: int, branch_pipe: float) -> int:
     """Remove a metamer and everything it carries, and close the gap in the tree's extent.
 
     Parameters
     ----------
-    arena : Metamers
+    place : Arena
         The arena; changed in place.
     trees : Trees
         The tree table; `size` is changed in place.
@@ -36,6 +36,7 @@ def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int, branch_pipe
     InputError
         If no metamer has that serial, or if it is the tree's first.
     """
+    arena = place.metamers
     start, n = int(trees.start[row]), int(trees.size[row])
     part = slice(start, start + n)
     at = np.flatnonzero(arena.serial[part] == serial)
@@ -54,8 +55,8 @@ def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int, branch_pipe
             where="Stand.prune",
             expected="a metamer above it; use Stand.fell to remove a tree",
         )
-    gone = np.zeros(n, np.bool_)
-    gone[cut] = True
+    gone = np.zeros(n, np.int32)
+    gone[cut] = 1
     for i in range(cut + 1, n):
         gone[i] = gone[parent[i]]
     bit = CONTINUED if arena.state[start + cut] & MAIN else BRANCHED
@@ -67,11 +68,6 @@ def cut_branch(arena: Metamers, trees: Trees, row: int, serial: int, branch_pipe
         here = lost * (branch_pipe if order[below] > 0 else 1.0)
         arena.sapwood[start + below] = max(0.0, float(arena.sapwood[start + below]) - here)
         below = int(parent[below])
-    stays = np.flatnonzero(~gone)
-    new_index = np.cumsum(~gone) - 1
-    for field in arena:
-        field[start : start + stays.size] = field[part][stays]
-    kept = arena.parent[start : start + stays.size]
-    kept[1:] = new_index[kept[1:]]
-    trees.size[row] = stays.size
-    return int(gone.sum())
+    kept = close_ranks(arena.parent[part], place.fields, start, n, gone, np.empty(n, np.int32))
+    trees.size[row] = kept
+    return n - int(kept)

@@ -120,7 +120,7 @@ def grow_year(
     year = year._replace(balance=balance)
     models = (year.paper or None, priority or None, balance or None)
     allocate(arena.metamers, trees, shared, scratch, traits, year, accounts, *models)
-    shed(arena.metamers, trees, shared, scratch, traits, not year.paper)
+    shed(arena, trees, shared, scratch, traits, not year.paper)
     grow_shoots(arena, trees, traits, year, no_solid(), pull=True)
     shared = deal(trees.size)
     thicken(arena.metamers, trees, shared, bench.scratch(shared), traits, year, accounts)

@@ -144,13 +144,52 @@ def test_a_thin_limb_is_thickened_first() -> None:
             for node in read_plant(m, trees, 0)
         ]
     )
-    wood = (density, slow.SUPPORT)
-    arguments = (m.parent[here], m.length[here], m.pipe[here], wood, leaf_mass, m.state[here])
+    wood = (density, slow.SUPPORT, leaf_mass)
+    fresh = (1.0, 1.0, 0.0)
+    arguments = (m.parent[here], m.length[here], m.pipe[here], m.state[here], wood, fresh)
     thin = m.pipe[here].copy()
-    half = reinforce(*arguments, 1e-4, *np.empty((2, n)))
+    half = reinforce(*arguments, 1e-4, np.empty((4, n)))
     assert half == pytest.approx(1e-4)
     m.pipe[here] = thin
-    reinforce(*arguments, 1e9, *np.empty((2, n)))
+    reinforce(*arguments, 1e9, np.empty((4, n)))
     radius = np.sqrt(m.pipe[here]) / 2
     needed = np.array([slow.needs_to_support(w, density) for w in load])
     np.testing.assert_allclose(radius, needed, rtol=1e-5)
+
+
+def test_no_limb_sags_beyond_the_limit() -> None:
+    """Where trees bend: W h^2 / E I of what is beyond a metamer, at most the limit."""
+    m, trees = random_arena(np.random.default_rng(7), 1, 50)
+    here = extent(trees, 0)
+    m.state[here] |= LATERAL
+    m.pipe[here] = 1e-9
+    density, leaf_mass, fresh_wood, fresh_leaf = 500.0, 0.02, 1.9, 2.5
+    modulus, limit, gravity = 6e9, 0.3, 9.80665
+    sag = 64.0 * gravity / (np.pi * modulus * limit)
+    nodes = read_plant(m, trees, 0)
+    expected = []
+    for node in nodes:
+        weight = turning = 0.0
+        for n in node.above():
+            wood = fresh_wood * density * np.pi / 4 * n.pipe * n.length
+            leaves = fresh_leaf * n.buds * leaf_mass
+            beyond = 0.0  # from the lower end of `node` to that of n
+            on_the_way = n
+            while on_the_way is not node:
+                on_the_way = on_the_way.below
+                beyond += on_the_way.length
+            weight += gravity * (wood + leaves)
+            turning += gravity * (wood * (beyond + 0.5 * n.length) + leaves * (beyond + n.length))
+        expected.append(turning**2 / weight / (modulus * limit))  # W h^2 / (E limit) = I
+    reinforce(
+        m.parent[here],
+        m.length[here],
+        m.pipe[here],
+        m.state[here],
+        (density, 1e12, leaf_mass),  # so strong that its load asks for nothing
+        (fresh_wood, fresh_leaf, sag),
+        1e9,
+        np.empty((4, int(trees.size[0]))),
+    )
+    area_moment = np.pi / 64 * m.pipe[here].astype(float) ** 2
+    np.testing.assert_allclose(area_moment, expected, rtol=1e-4)

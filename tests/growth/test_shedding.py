@@ -11,7 +11,7 @@ from forest.growth.dealing import Workbench, deal
 from forest.growth.shedding import shed
 from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, TERMINAL
 from tests.builders import random_arena
-from tests.growth.growing import copied, extent, make_species, make_traits
+from tests.growth.growing import arena_of, copied, extent, make_species, make_traits
 from tests.growth.invariants import assert_valid
 from tests.reference import shedding as slow
 from tests.reference.plant import read_plant
@@ -24,7 +24,14 @@ def _shed(m, trees, threshold: float, drop_bare: bool) -> None:  # type: ignore[
         shedding={"light_per_internode": threshold}, carbon={"branch_pipe_ratio": KAPPA}
     )
     shared = deal(trees.size)
-    shed(m, trees, shared, Workbench().scratch(shared), make_traits(species), drop_bare)
+    shed(
+        arena_of(m, trees),
+        trees,
+        shared,
+        Workbench().scratch(shared),
+        make_traits(species),
+        drop_bare,
+    )
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.25, 0.5]), st.booleans(), st.booleans())

@@ -92,7 +92,7 @@ def test_later_schema(tmp_path: Path, good: bytes) -> None:
     path.write_bytes(good)
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = 99
-    refuse(path, "is of schema version 99; expected a version up to 1")
+    refuse(path, "is of schema version 99; expected a version up to 2")
 
 
 def test_existing_path_needs_overwrite(tmp_path: Path, good: bytes) -> None:

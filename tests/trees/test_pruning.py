@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from forest.errors import InputError
 from forest.trees.pruning import cut_branch
 from tests.builders import random_arena
-from tests.growth.growing import copied, extent
+from tests.growth.growing import arena_of, copied, extent
 from tests.growth.invariants import assert_valid
 from tests.reference.plant import read_plant
 
@@ -28,7 +28,7 @@ def test_what_stands_on_the_cut_goes(seed: int) -> None:
         return
     cut = nodes[int(rng.integers(1, len(nodes)))]
     gone = {node.serial for node in cut.above()}
-    assert cut_branch(m, trees, 1, cut.serial, KAPPA) == len(gone)
+    assert cut_branch(arena_of(m, trees), trees, 1, cut.serial, KAPPA) == len(gone)
     assert_valid(m, trees)
     here, was = extent(trees, 1), extent(old, 1)
     stays = ~np.isin(before.serial[was], list(gone))
@@ -56,4 +56,4 @@ def test_refused(serial: int) -> None:
     m, trees = random_arena(np.random.default_rng(1), 1, 10)
     m.serial[extent(trees, 0)] = np.arange(int(trees.size[0]))
     with pytest.raises(InputError, match=str(serial)):
-        cut_branch(m, trees, 0, serial, KAPPA)
+        cut_branch(arena_of(m, trees), trees, 0, serial, KAPPA)

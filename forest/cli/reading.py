@@ -1,0 +1,101 @@
+"""The commands that read a run file for people: tables on the screen, pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from forest.cli.shared import RunFile, check_picture, print_pairs, print_stand_table
+
+if TYPE_CHECKING:
+    from forest.scenario import Scenario
+    from forest.trees.skeleton import Skeleton
+
+
+def table(run_file: RunFile) -> None:
+    """Print the stand table: the first, every tenth and the last year.
+
+    Example:
+
+        forest table run.h5
+    """
+    from forest.record.run import open_run
+
+    with open_run(run_file) as run:
+        print_stand_table(run)
+
+
+def info(run_file: RunFile) -> None:
+    """Say what a run file holds and what made it.
+
+    Example:
+
+        forest info run.h5
+    """
+    from forest.record.export import info as describe_run
+    from forest.record.run import open_run
+
+    with open_run(run_file) as run:
+        print_pairs(describe_run(run))
+
+
+def picture(
+    run_file: RunFile,
+    to: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="The stand in 3D, in its last year.")
+    ] = None,
+    development: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="The stand's development over time.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
+) -> None:
+    """Draw the stand of a run, its development, or both.
+
+    The 3D picture shows every tree with all its branches, from the checkpoint beside the run.
+
+    Example:
+
+        forest picture run.h5 --to stand.png --development development.png
+    """
+    from forest.errors import InputError
+    from forest.record.run import open_run
+
+    wanted = [path for path in (to, development) if path is not None]
+    if not wanted:
+        raise InputError("nothing to draw", expected="--to FILE.png or --development FILE.png")
+    for path in wanted:
+        check_picture(path, force)
+    with open_run(run_file) as run:
+        if development is not None:
+            from forest.view.development import draw_development
+
+            if not len(run.years) or "stand" not in run.tables:
+                raise InputError("holds no stand table to draw", where=str(run_file))
+            draw_development(run, development)
+            typer.echo(f"{development}: stand development")
+        if to is not None:
+            from forest.view.stand_picture import draw_stand
+
+            year, skeletons = _last_shapes(run_file, run.scenario)
+            draw_stand(skeletons, run.scenario.plot.size_m, to)
+            typer.echo(f"{to}: {len(skeletons)} trees in {year}")
+
+
+def _last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]]:
+    """Bring back all trees as they were at the last checkpoint: calendar year and shapes."""
+    from forest.errors import InputError
+    from forest.record.checkpoint import latest_checkpoint
+
+    found = latest_checkpoint(run_file)
+    if found is None:
+        raise InputError(
+            "has no checkpoint beside it, and only checkpoints hold the shapes of all trees",
+            where=str(run_file),
+            expected=f"{run_file.name}.checkpoint-*.npz in the same folder",
+        )
+    from forest.stand import Stand
+
+    stand = Stand.restore(scenario, *found)
+    return stand.year, [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
