@@ -51,6 +51,8 @@ class Stand:
         The tree table, one row per living tree, in order of tree id.
     arena : Arena
         The metamers of all trees.
+    measured_species : MeasureSpecies
+        What mensuration must know of the species.
     steps : int
         Years grown so far.
     pending : list of Event
@@ -85,7 +87,7 @@ class Stand:
         )
         self._ring_heights = np.array(scenario.output.ring_heights_m, np.float64)
         self._pipes_before = np.empty(0, np.float32)
-        self._measures_of = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
@@ -215,7 +217,7 @@ class Stand:
         measures = measure_trees(
             self.arena.metamers,
             self.rows,
-            self._measures_of,
+            self.measured_species,
             self._full_light,
             self._ring_heights,
         )
@@ -397,7 +399,9 @@ class Stand:
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""
-        return measure_trees(self.arena.metamers, self.rows, self._measures_of, self._full_light)
+        return measure_trees(
+            self.arena.metamers, self.rows, self.measured_species, self._full_light
+        )
 
     def skeleton(self, tree_id: int, season: Literal["summer", "winter"] = "summer") -> Skeleton:
         """The shape of a living tree.

@@ -94,7 +94,7 @@ class TreeMeasures(NamedTuple):
 
 
 @njit
-def _octagon(reach: Any) -> Any:
+def octagon(reach: Any) -> Any:
     """Give mean radius and area of the octagon whose corners are the reaches (squared).
 
     `reach` is indexed by the bits of a sector: 1 steep (|y| > |x|), 2 x < 0, 4 y < 0.
@@ -190,7 +190,7 @@ def _measure_tree(
     out.buds[t] = buds
     out.height_m[t] = height
     out.crown_base_m[t] = crown_base if buds > 0 else _NAN
-    out.crown_radius_m[t], out.crown_area_m2[t] = _octagon(reach)
+    out.crown_radius_m[t], out.crown_area_m2[t] = octagon(reach)
     out.light[t] = light / (buds * full_light) if buds > 0 else _NAN
     leaves = buds * species.leaf_area_m2[kind]
     out.leaf_area_m2[t] = leaves
