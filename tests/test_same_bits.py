@@ -150,7 +150,7 @@ def test_restored_stand_goes_on_the_same(
 
 @pytest.mark.parametrize("mechanics", MECHANICS)
 def test_bent_stand_on_threads_and_restored(tmp_path: Path, mechanics: str) -> None:
-    """One thread, two, and a checkpoint amid the years: shapes, rings and stability are the same."""
+    """One thread, two, and a checkpoint amid the years: the same shapes, rings and stability."""
     scenario = tiny(*MECHANICS[mechanics])
     whole = Stand(scenario)
     with using_threads(1):

@@ -61,7 +61,7 @@ def _leaning(lean, azimuth, roll):  # type: ignore[no-untyped-def]
 def test_both_ways_name_the_same_side(
     lean: float, azimuth: float, roll: float, conifer: bool
 ) -> None:
-    """A leaning stem is thick below in conifers and above in broadleaves; below is its lean's way."""
+    """Leaning stems are thick below in conifers and above in broadleaves; they lean below."""
     n = 12
     m, trees = pole(np.full(n, 0.03), 3.0, lean)
     x, y = m.tip[:n, 0].copy(), m.tip[:n, 1].copy()
