@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from forest._jit import driver, njit
 from forest._threads import in_threads
-from forest.mechanics.stress import PROJECTION
+from forest.mechanics.stress import ATTENUATION, PROJECTION
 from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
 
@@ -176,11 +176,26 @@ def upwind_depth(
     return depth
 
 
-def exposure(depth: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the wind at the trees' tops as a share of that over an open canopy.
+def sheltered(depth: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the wind at the trees' tops, and how fast it falls below the canopy's top.
 
-    The root of the mean of its square over the sectors, since loads grow with the square; from a
-    sector behind the depth lambda blows 1 / sqrt(1 + beta lambda) (Raupach 1992).
+    From a sector behind the depth lambda the wind's square is w = 1 / (1 + beta lambda) of that
+    over an open canopy (Raupach 1992), and its attenuation a (1 - w), which tends to that of closed
+    stands.
+
+    Parameters
+    ----------
+    depth : float64 (n, SECTORS)
+        See `upwind_depth`.
+
+    Returns
+    -------
+    exposure : float64 (n,)
+        Share of the speed over an open canopy: the root of the mean of w, as loads go by squares.
+    attenuation : float64 (n,)
+        Mean over the sectors, weighted by w.
     """
-    share: NDArray[np.float64] = np.sqrt(np.mean(1.0 / (1.0 + PARTITION * depth), axis=1))
-    return share
+    square = 1.0 / (1.0 + PARTITION * depth)
+    mean = np.mean(square, axis=1)
+    attenuation = ATTENUATION * np.mean(square * (1.0 - square), axis=1) / mean
+    return np.sqrt(mean), attenuation

@@ -31,17 +31,17 @@ def _heavy_side(stem):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _need_of_stem(stem, tip, pipe, speed, canopy_height, drag, limit, force, moment, need):  # type: ignore[no-untyped-def]
-    """Fill the d^2 that each station needs; give the stress at the ground per limit."""
+def _need_of_stem(stem, tip, pipe, speed, profile, drag, limit, force, moment, need):  # type: ignore[no-untyped-def]
+    """Fill the d^2 that each station needs; give the stress at the foot per limit."""
     for k in range(len(force)):
         moment[k] = PROJECTION * stem.leaf_area[k]
-    wind_forces(stem.leaf_height, moment, speed, canopy_height, drag, force)
+    wind_forces(stem.leaf_height, moment, speed, profile, drag, force)
     along_x, along_y = _heavy_side(stem)
     bending_moments(stem, tip, force, along_x, along_y, moment)
     for k in range(len(force)):
         need[stem.metamer[k]] = (32.0 * moment[k] / (np.pi * limit)) ** (2.0 / 3.0)
-    foot = np.float64(pipe[0])
-    return (np.float64(need[0]) / foot) ** 1.5 if foot > 0.0 else 0.0
+    wood = np.float64(pipe[0])  # none before the first year
+    return (np.float64(need[0]) / wood) ** 1.5 if wood > 0.0 else 0.0
 
 
 @driver
@@ -67,7 +67,7 @@ def _feel(first, step, arena, trees, shared, scratch, species, limit, wind, rigi
                 arena.tip[s : s + n],
                 arena.pipe[s : s + n],
                 wind.speed[row],
-                wind.canopy_height,
+                (wind.canopy_height, wind.attenuation[row]),
                 species.drag[sp],
                 limit[sp],
                 work[9][:k],
@@ -94,7 +94,7 @@ def feel_wind(
     ----------
     metamers, trees : Metamers, Trees
         Arena and table, with this year's shoots; pipes are d^2. `trees.wind_stress` becomes the
-        stress at each stem's foot per limit, in last year's wood.
+        stress at the stems' feet per limit, in last year's wood.
     shared, scratch : Deal, Scratch
         How trees are dealt to threads, and their scratch memory.
     species : StemSpecies

@@ -19,7 +19,7 @@ from forest.mechanics.loads import LoadSpecies, bury_sites, hang, make_loads
 from forest.mechanics.righting import BETA, NONE, STRAIN
 from forest.mechanics.rings import upright_azimuth
 from forest.mechanics.rods import Rods, allocate_rods, frame_new
-from forest.mechanics.shelter import Plot, exposure, silhouettes, upwind_depth
+from forest.mechanics.shelter import Plot, sheltered, silhouettes, upwind_depth
 from forest.mechanics.stability import Stability, stability
 from forest.mechanics.stems import NO_RIGIDITY, StemSpecies
 from forest.mechanics.stress import Wind
@@ -205,8 +205,8 @@ class Mechanics:
         seen = silhouettes(arena.metamers, trees, self._stems.leaf_area)
         tall = seen.height[seen.height > 0.0]
         canopy_height = float(np.quantile(tall, _CANOPY_TOP)) if len(tall) else 0.0
-        exposed = exposure(upwind_depth(trees.x, trees.y, seen, self._plot))
-        return Wind(self._spec.wind_m_s * exposed, max(canopy_height, 0.1), 0.0)
+        share, attenuation = sheltered(upwind_depth(trees.x, trees.y, seen, self._plot))
+        return Wind(self._spec.wind_m_s * share, max(canopy_height, 0.1), 0.0, attenuation)
 
 
 def _tropism(species: Sequence[Species]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -96,7 +96,7 @@ class Mechanics(Table):
     )
     wind_m_s: float = quantity(
         0.0,
-        "usual strongest wind of a year at the top of an open canopy, for which stresses are told",
+        "usual mean wind of a storm at the top of an open canopy, for which stresses are told",
         unit="m/s",
         ge=0,
         le=100,

@@ -282,7 +282,7 @@ class Mechanics(Table):
         0.3, "drag of the crown per frontal area, before leaves stream with the wind", ge=0, le=2
     )
     wind_stress_limit: float = quantity(
-        0.2,
+        0.05,
         "stress in the usual wind, as a share of rupture_mpa, beyond which a stem thickens first "
         "and spends less on length (wind_growth)",
         gt=0,
