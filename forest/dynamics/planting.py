@@ -1,12 +1,14 @@
-"""New trees: rows of the tree table for seedlings at given places."""
+"""New trees: whether they can be planted, and their rows of the tree table."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.errors import InputError
 from forest.random import STREAM_VIGOUR, normals
 from forest.trees.table import Trees, empty
 
@@ -53,6 +55,7 @@ def seedlings(
     trees.y[:] = y
     trees.birth[:] = step
     trees.breast_serial[:] = -1
+    trees.disc_serial[:] = -1
     for axis, place in enumerate((x, y)):
         voxel = np.floor(np.asarray(place) / voxel_m)
         trees.base_voxel[:, axis] = voxel
@@ -63,3 +66,35 @@ def seedlings(
         cut = min(max(float(draw), -_CUT), _CUT)
         trees.vigour[row] = 1.0 + vigour_sd[trees.species[row]] * cut
     return trees
+
+
+def check_planting(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    names: Sequence[str],
+    size_m: tuple[float, float],
+    known: Sequence[str],
+) -> None:
+    """Refuse trees that cannot be planted: outside the plot, or of an unknown species."""
+    if not len(x) == len(y) == len(names):
+        raise InputError(
+            f"{len(x)} x, {len(y)} y and {len(names)} species",
+            where="Stand.plant",
+            expected="as many of each",
+        )
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"species '{name}' is not in this stand",
+                where="Stand.plant",
+                expected="one of " + ", ".join(known),
+            )
+    width, depth = size_m
+    inside = (x >= 0) & (x <= width) & (y >= 0) & (y <= depth)
+    if not inside.all():
+        k = int(np.flatnonzero(~inside)[0])
+        raise InputError(
+            f"({x[k]}, {y[k]}) is outside the plot",
+            where="Stand.plant",
+            expected=f"0 to {width} and 0 to {depth} m",
+        )
