@@ -162,7 +162,8 @@ def _draw(stands: dict[str, pd.DataFrame], to: Path) -> None:
             scale=1.0,
             width=0.005,
         )
-        axis.set(title=name, xlabel="x, m", aspect="equal", xlim=(0, SIDE_M), ylim=(0, SIDE_M))
+        view = (-2.0, SIDE_M + 2.0)
+        axis.set(title=name, xlabel="x, m", aspect="equal", xlim=view, ylim=view)
     axes[0].set_ylabel("y, m")
     figure.colorbar(marks, ax=list(axes), label="slenderness H/D")
     figure.savefig(to, dpi=110, bbox_inches="tight")
