@@ -25,9 +25,8 @@ _COLUMNS = {
     "safety_median": ("\nmedian", 1),
     "share_below_1": ("share\n< 1", 2),
     "frequency_hz": ("sway\nHz", 2),
-    "stress_share": ("stress\nweight", 3),
-    "wind_stress_share": ("per limit\nwind", 3),
-    "wind_stress_max": ("\nwind max", 3),
+    "wind_stress_share": ("wind\nstress", 2),
+    "wind_stress_max": ("\nmax", 2),
 }
 
 
@@ -109,12 +108,12 @@ def classes(trees: pd.DataFrame) -> pd.DataFrame:
 
 
 def stability_table(trees: pd.DataFrame) -> Table:
-    """Give the classes of `classes` as a table for the terminal."""
+    """Give the classes of `classes` as a table for the terminal, without the stress of weight."""
     from rich.table import Table
 
     table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0))
-    table.add_column("species", vertical="bottom")
-    table.add_column("dbh", vertical="bottom")
+    table.add_column("species", vertical="bottom", no_wrap=True)
+    table.add_column("dbh", vertical="bottom", no_wrap=True)
     for heading, _ in _COLUMNS.values():
         table.add_column(heading, justify="right")
     for _, row in classes(trees).iterrows():
