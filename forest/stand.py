@@ -425,7 +425,8 @@ class Stand:
         row = self.row_of(tree_id)
         kind = int(self.rows.species[row])
         metamers, rows = self.arena.metamers, self.rows
-        if season == "winter" and self.mechanics is not None:
+        bent = int(rows.birth[row]) < self.steps  # a seedling just planted has no rods yet
+        if season == "winter" and self.mechanics is not None and bent:
             metamers, rows = self.mechanics.winter(self.arena, self.rows, row)
             row = 0
         return skeleton_of(

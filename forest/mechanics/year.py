@@ -114,17 +114,23 @@ class Mechanics:
         frame_new(metamers, trees, shared, rods, step, self._tropism, self._stiffness)
         righting = _RIGHTING[self._spec.righting]
         lay_wood(metamers, trees, shared, rods, self._woods, righting, self.ring)
+        self.settle(arena, trees)
+        bury_sites(metamers, trees, shared)
+
+    def settle(self, arena: Arena, trees: Trees) -> None:
+        """Bring all trees to rest under summer's load."""
+        metamers = arena.metamers
+        shared = deal(trees.size)
         hang(metamers, trees, shared, self._load_species, self._loads)
         self.settled = settle(
             metamers,
             trees,
             shared,
-            rods,
+            arena.companions,
             self._loads,
             self._bench.work(shared),
             tolerance=self._spec.tolerance_rad,
         )
-        bury_sites(metamers, trees, shared)
 
     def winter(self, arena: Arena, trees: Trees, row: int) -> tuple[Metamers, Trees]:
         """Give one tree as it stands in winter, without fruit and what leaves fall.
