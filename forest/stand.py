@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.dynamics.planting import seedlings
+from forest.dynamics.planting import headings, seedlings
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
 from forest.errors import InputError, nearest
@@ -70,7 +70,7 @@ class Stand:
     def __init__(self, scenario: Scenario) -> None:
         self._start(scenario)
         x, y, species = scenario.planting_positions()
-        self._plant(x, y, species)
+        self._plant(x, y, species, headings(*scenario.planting_leans()))
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -236,7 +236,13 @@ class Stand:
     # ------------------------------------------------------------------ acts between years
 
     def plant(
-        self, x: Sequence[float], y: Sequence[float], species: str | Sequence[str]
+        self,
+        x: Sequence[float],
+        y: Sequence[float],
+        species: str | Sequence[str],
+        *,
+        lean_deg: float | Sequence[float] = 0.0,
+        lean_azimuth_deg: float | Sequence[float] = 0.0,
     ) -> list[int]:
         """Plant seedlings; they start to grow with the next step.
 
@@ -246,6 +252,9 @@ class Stand:
             Places, m, inside the plot.
         species : str or sequence of str
             Name or names of species of the scenario.
+        lean_deg, lean_azimuth_deg : float or sequence of float
+            Angle of the stems to the vertical, 0 to 85, and the direction towards which they lean,
+            from x to y.
 
         Returns
         -------
@@ -279,11 +288,30 @@ class Stand:
             )
         if self.scenario.plot.boundary == "periodic":
             at = at[0] % width, at[1] % depth
+        leans = []
+        for key, value, low, high in (
+            ("lean_deg", lean_deg, 0.0, 85.0),
+            ("lean_azimuth_deg", lean_azimuth_deg, -360.0, 360.0),
+        ):
+            angle = np.asarray(value, np.float64)
+            if angle.shape not in ((), (len(x),)) or not ((angle >= low) & (angle <= high)).all():
+                raise InputError(
+                    f"{key} = {value}",
+                    where="Stand.plant",
+                    expected=f"{low:g} to {high:g}, one for all trees or one for each",
+                )
+            leans.append(np.broadcast_to(angle, len(x)))
         first = self.next_id
-        self._plant(*at, np.array([known[name] for name in names], np.int16))
+        self._plant(*at, np.array([known[name] for name in names], np.int16), headings(*leans))
         return list(range(first, self.next_id))
 
-    def _plant(self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]) -> None:
+    def _plant(
+        self,
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        species: NDArray[Any],
+        heading: NDArray[np.float64],
+    ) -> None:
         more = seedlings(
             x,
             y,
@@ -302,7 +330,7 @@ class Stand:
         wanted = rows.size.astype(np.int64)
         wanted[first_row:] = 1
         self.arena.make_room(rows.start, rows.size, rows.room, wanted)
-        sprout(self.arena.metamers, rows, first_row, self._traits, self._year())
+        sprout(self.arena.metamers, rows, first_row, heading, self._traits, self._year())
         measures = self.measure()
         for row in range(first_row, len(rows.tree_id)):
             self.pending.append(Event.of(self, row, "planted", "none", measures))

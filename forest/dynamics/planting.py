@@ -14,6 +14,28 @@ from forest.trees.table import Trees, empty
 _CUT = 2.5
 
 
+def headings(
+    lean_deg: NDArray[np.float64], azimuth_deg: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Give the directions of stems that lean.
+
+    Parameters
+    ----------
+    lean_deg : float64 (n,)
+        Angle to the vertical.
+    azimuth_deg : float64 (n,)
+        Direction towards which they lean, from x to y.
+
+    Returns
+    -------
+    float64 (n, 3)
+        Unit vectors.
+    """
+    lean, azimuth = np.radians(lean_deg), np.radians(azimuth_deg)
+    side = np.sin(lean)
+    return np.stack((side * np.cos(azimuth), side * np.sin(azimuth), np.cos(lean)), axis=1)
+
+
 def seedlings(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
