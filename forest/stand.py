@@ -147,7 +147,7 @@ class Stand:
             shared,
             self._bench.scratch(shared),
             self._traits,
-            not self._paper,
+            not self._paper or bool(self.arena.companions),  # it may have bent below the ground
         )
         self._lap("shed")
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from analysis.bent_form import curvature, grow, inflections, lean_with_age, s_share, tip_height_m
 from analysis.biomechanics import DECURRENT, FRUIT_KG, fruit, last, life, tilted
 from analysis.tree_form import form_of
+from forest.trees.skeleton import Skeleton
 
 
 def test_tilted_seedlings_right_themselves() -> None:
@@ -95,3 +99,22 @@ def test_stems_that_grow_sideways_rise_in_trolls_model() -> None:
     assert old < young - 30.0
     young, old = lean_with_age(life("troll", 'mechanics.righting="none"'), [0])
     assert old > young
+
+
+def _bare(tree: Skeleton) -> NDArray[np.bool_]:
+    """Which internodes bear no living site, on themselves or beyond."""
+    alive = tree.leafy.copy()
+    for i in range(len(tree) - 1, 0, -1):
+        alive[tree.parent[i]] |= alive[i]
+    return ~alive
+
+
+def test_what_hangs_into_the_ground_dies_and_is_shed() -> None:
+    """The wood of Champagnat's tree here is so weak that its stem falls over."""
+    buried = 0
+    for before, after in pairwise(life("champagnat", "seed=1")):
+        assert not after.leafy[after.end[:, 2] < 0.0].any()
+        dead = before.serial[_bare(before)]
+        buried += len(dead)
+        assert not np.isin(dead, after.serial).any()
+    assert buried > 0
