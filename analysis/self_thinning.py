@@ -69,8 +69,8 @@ def grow(scenario: forest.Scenario) -> History:
     for _ in range(scenario.years):
         tables = stand.step().tables
         rows.append({name: column[-1] for name, column in tables["stand"].items()})
-        rings = tables["rings"]
-        widths.append(pd.Series(rings["width_mm"], index=rings["tree_id"], dtype=float))
+        trees = tables["trees"]
+        widths.append(pd.Series(trees["ring_width_mm"], index=trees["tree_id"]).dropna())
     table = pd.DataFrame(rows)
     table.index = pd.RangeIndex(1, len(table) + 1, name="age")
     by_tree = pd.DataFrame(widths, index=table.index)

@@ -32,6 +32,10 @@ class InputError(ValueError):
         super().__init__(" ".join("".join(parts).split()))
 
 
+class ActError(InputError):
+    """An act of the scenario that cannot be done in its year; nothing of that year was done."""
+
+
 class OutputError(InputError):
     """Output that cannot be written: the folder, the rights, or the room on the disk."""
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from forest._jit import announce_compiling
 from forest._threads import most_threads, using_threads
-from forest.errors import InputError
+from forest.errors import ActError, InputError
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
 from forest.record.writer import RunWriter, check_target
@@ -64,6 +64,7 @@ def simulate(
     resume : bool
         Go on with an unfinished run of the same scenario, from its last checkpoint; a run without
         one starts over. A finished run is given back, and goes on if `scenario.years` has grown.
+        Acts of years that are not on file may differ.
     overwrite : bool
         Replace an existing file.
     progress : bool or Observer
@@ -80,6 +81,9 @@ def simulate(
     ------
     InputError
         If the file cannot be written, or cannot be resumed with this scenario.
+    ActError
+        If an act of the scenario cannot be done in its year. The years before are on file, and
+        the run can be resumed with other acts from that year on.
     Interrupted
         After SIGINT or SIGTERM; the year was finished and a checkpoint written.
     """
@@ -132,7 +136,12 @@ def _grow(stand: Stand, writer: RunWriter, out: Path, observer: Observer) -> Non
     observer.begin(scenario.years, stand.steps)
     with _stop_requests(observer) as stop:
         while stand.steps < scenario.years:
-            record = stand.step()
+            try:
+                record = stand.step()
+            except ActError:  # nothing of the year is done yet: all years so far are kept
+                _checkpoint(stand, writer, out)
+                writer.interrupt()
+                raise
             writer.append_year(record.year, record.tables, record.samples)
             observer.year_done(stand)
             last = stand.steps == scenario.years
@@ -174,13 +183,14 @@ def _create(
 def _is_complete(scenario: Scenario, out: Path) -> bool:
     """Tell whether a run file holds all years of its scenario; refuse that of another one."""
     with open_run(out) as run:
-        if not _same_but_for_years(run.scenario, scenario):
+        years_done = len(run.years)
+        if not _same_so_far(run.scenario, scenario, years_done):
             raise InputError(
                 "was made by a different scenario",
                 where=f"--resume {out}",
-                expected="the same scenario, seed and settings; only `years` may grow",
+                expected="the same scenario, seed and settings; only `years` may grow, and acts "
+                "of years that are not on file may differ",
             )
-        years_done = len(run.years)
         if years_done > scenario.years:
             raise InputError(
                 f"holds {years_done} years already",
@@ -190,11 +200,16 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
         return run.complete and years_done == scenario.years
 
 
-def _same_but_for_years(one: Scenario, other: Scenario) -> bool:
-    """Compare two scenarios; each may choose its sample trees in its own last year."""
+def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
+    """Compare two scenarios but for their years, and for acts in years that are not done.
+
+    Each may choose its sample trees in its own last year.
+    """
     contents = []
     for scenario in (one, other):
         content = scenario.model_dump()
+        done = range(scenario.start_year, scenario.start_year + years_done)
+        content["acts"] = [act for act in content["acts"] if act["year"] in done]
         last = scenario.start_year + content.pop("years") - 1
         samples = content["output"]["sample_trees"]
         if samples["at_year"] == last:

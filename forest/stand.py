@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.dynamics.planting import headings, seedlings
+from forest import management
+from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
-from forest.errors import InputError, nearest
 from forest.growth import budget
 from forest.growth.allocate import allocate
 from forest.growth.dealing import Deal, Workbench, deal
@@ -20,15 +20,13 @@ from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds, sprout
-from forest.measure.rings import remember_breast
+from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.year import Mechanics, MechanicsSpec
-from forest.record.schema import CAUSES
 from forest.stand_state import put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.trees.pruning import cut_branch
-from forest.yearbook import Event, YearRecord, record_year
+from forest.yearbook import Event, Loss, YearRecord, record_year
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,10 +51,14 @@ class Stand:
         The tree table, one row per living tree, in order of tree id.
     arena : Arena
         The metamers of all trees.
+    measured_species : MeasureSpecies
+        What mensuration must know of the species.
     steps : int
         Years grown so far.
     pending : list of Event
         Events since the last record.
+    losses : dict of int to Loss
+        What acts took from sample trees since the last record, by tree id.
     next_id : int
         Id of the next tree.
     mechanics : Mechanics or None
@@ -71,6 +73,7 @@ class Stand:
         self._start(scenario)
         x, y, species = scenario.planting_positions()
         self._plant(x, y, species, headings(*scenario.planting_leans()))
+        management.check_due(self)  # what cannot be done in the first year is refused before it
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -82,7 +85,9 @@ class Stand:
             paper=self._paper,
             bending=scenario.mechanics is not None and scenario.mechanics.bending,
         )
-        self._measures_of = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self._ring_heights = np.array(scenario.output.ring_heights_m, np.float64)
+        self._pipes_before = np.empty(0, np.float32)
+        self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
@@ -94,15 +99,24 @@ class Stand:
         self.steps = 0
         self.next_id = 1
         self.pending: list[Event] = []
+        self.losses: dict[int, Loss] = {}
         self.sample_ids: list[int] = []
         self.seconds: dict[str, float] = {}
 
     # ------------------------------------------------------------------ the year
 
     def step(self) -> YearRecord:
-        """Grow for one year and give its record."""
-        self.steps += 1
+        """Do the scenario's acts of the next year, grow for that year and give its record.
+
+        Raises
+        ------
+        ActError
+            If an act cannot be done; then the stand is as it was.
+        """
         self._clock = time.perf_counter()
+        management.act(self, self._traits.of["branch_pipe"])
+        self._lap("act")
+        self.steps += 1
         year = self._year()
         accounts = np.zeros((len(self.rows.tree_id), budget.ACCOUNTS))
         shared = deal(self.rows.size)
@@ -113,10 +127,11 @@ class Stand:
         self._allocate(shared, year, accounts)
         self._shed(shared)
         shared = self._extend(year)
+        rings = self._note_pipes()
         self._thicken(shared, year, accounts)
         self._bend()
         measures, dead = self._die()
-        record = record_year(self, measures, dead, accounts, before)
+        record = record_year(self, measures, dead, accounts, before, rings)
         self._bury(dead, measures)
         self._lap("record")
         return record
@@ -172,6 +187,14 @@ class Stand:
         self._lap("extend")
         return deal(rows.size)
 
+    def _note_pipes(self) -> RingYear:
+        """Keep how thick everything is before it thickens."""
+        if len(self._pipes_before) != self.arena.capacity:
+            self._pipes_before = np.empty(self.arena.capacity, np.float32)
+        used = self.arena.used
+        self._pipes_before[:used] = self.arena.metamers.pipe[:used]
+        return RingYear(self.year, self.steps, self._pipes_before, self.pipe_exponent)
+
     def _thicken(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
         thicken(
             self.arena.metamers,
@@ -192,7 +215,11 @@ class Stand:
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
         """Measure all trees; name the rows of those that die, with the cause."""
         measures = measure_trees(
-            self.arena.metamers, self.rows, self._measures_of, self._full_light
+            self.arena.metamers,
+            self.rows,
+            self.measured_species,
+            self._full_light,
+            self._ring_heights,
         )
         dead: list[tuple[int, str]] = []
         if not self._paper:
@@ -204,8 +231,9 @@ class Stand:
         return measures, dead
 
     def _bury(self, dead: list[tuple[int, str]], measures: TreeMeasures) -> None:
-        remember_breast(self.rows, measures)
+        remember_discs(self.rows, self.arena.metamers, measures)
         self.pending = []
+        self.losses = {}
         if dead:
             alive = np.ones(len(self.rows.tree_id), np.bool_)
             alive[[row for row, _ in dead]] = False
@@ -262,47 +290,15 @@ class Stand:
             The new trees' ids.
         """
         names = [species] * len(x) if isinstance(species, str) else list(species)
-        if not len(x) == len(y) == len(names):
-            raise InputError(
-                f"{len(x)} x, {len(y)} y and {len(names)} species",
-                where="Stand.plant",
-                expected="as many of each",
-            )
-        known = {name: k for k, name in enumerate(self.species_names)}
-        for name in names:
-            if name not in known:
-                raise InputError(
-                    f"species '{name}' is not in this stand",
-                    where="Stand.plant",
-                    expected="one of " + ", ".join(known),
-                )
         at = np.asarray(x, np.float64), np.asarray(y, np.float64)
         width, depth = self.scenario.plot.size_m
-        inside = (at[0] >= 0) & (at[0] <= width) & (at[1] >= 0) & (at[1] <= depth)
-        if not inside.all():
-            k = int(np.flatnonzero(~inside)[0])
-            raise InputError(
-                f"({at[0][k]}, {at[1][k]}) is outside the plot",
-                where="Stand.plant",
-                expected=f"0 to {width} and 0 to {depth} m",
-            )
+        check_planting(*at, names, (width, depth), self.species_names)
+        leans = check_leans(len(x), lean_deg, lean_azimuth_deg)
         if self.scenario.plot.boundary == "periodic":
             at = at[0] % width, at[1] % depth
-        leans = []
-        for key, value, low, high in (
-            ("lean_deg", lean_deg, 0.0, 85.0),
-            ("lean_azimuth_deg", lean_azimuth_deg, -360.0, 360.0),
-        ):
-            angle = np.asarray(value, np.float64)
-            if angle.shape not in ((), (len(x),)) or not ((angle >= low) & (angle <= high)).all():
-                raise InputError(
-                    f"{key} = {value}",
-                    where="Stand.plant",
-                    expected=f"{low:g} to {high:g}, one for all trees or one for each",
-                )
-            leans.append(np.broadcast_to(angle, len(x)))
         first = self.next_id
-        self._plant(*at, np.array([known[name] for name in names], np.int16), headings(*leans))
+        codes = np.array([self.species_names.index(name) for name in names], np.int16)
+        self._plant(*at, codes, headings(*leans))
         return list(range(first, self.next_id))
 
     def _plant(
@@ -350,31 +346,36 @@ class Stand:
         InputError
             If there is no such tree or cause; then none is felled.
         """
-        if cause not in CAUSES:
-            raise InputError(
-                f"unknown cause '{cause}', {nearest(cause, CAUSES)}", where="Stand.fell"
-            )
-        rows = [self.row_of(tree_id) for tree_id in tree_ids]
-        measures = self.measure()
-        alive = np.ones(len(self.rows.tree_id), np.bool_)
-        for row in rows:
-            if alive[row]:
-                self.pending.append(Event.of(self, row, "felled", cause, measures))
-            alive[row] = False
-        self.rows = table.keep(self.rows, alive)
+        management.fell(self, tree_ids, cause)
 
-    def prune(self, tree_id: int, metamer: int) -> int:
-        """Cut a tree above the foot of a metamer, named by its serial number.
+    def prune(
+        self, tree_id: int, metamer: int | Sequence[int] | None = None, **branches: float
+    ) -> int:
+        """Cut parts off a tree: at metamers, or the branches on its trunk that a choice names.
 
-        Returns the number of metamers that go. Cutting the first metamer is refused: fell the tree.
+        Parameters
+        ----------
+        tree_id : int
+            A living tree.
+        metamer : int or sequence of int, optional
+            Serial numbers of metamers: each goes with all that it carries.
+        **branches : float
+            In place of metamers, as in a scenario's acts: `below_m`, the height below which
+            branches go, m; or `side_deg`, the side to which those point that go, with or without
+            `within_deg`, `from_m`, `to_m`. See `forest.scenario.acts.Branches`.
+
+        Returns
+        -------
+        int
+            Metamers removed.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree or metamer, or if the first metamer is to go: fell the tree.
         """
-        row = self.row_of(tree_id)
-        measures = self.measure()
-        kind = int(self.rows.species[row])
-        branch_pipe = float(self._traits.of["branch_pipe"][kind])
-        gone = cut_branch(self.arena, self.rows, row, metamer, branch_pipe)
-        self.pending.append(Event.of(self, row, "pruned", "none", measures))
-        return gone
+        branch_pipe = self._traits.of["branch_pipe"]
+        return management.prune(self, tree_id, metamer, branches, branch_pipe)
 
     # ------------------------------------------------------------------ what it is now
 
@@ -415,7 +416,9 @@ class Stand:
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""
-        return measure_trees(self.arena.metamers, self.rows, self._measures_of, self._full_light)
+        return measure_trees(
+            self.arena.metamers, self.rows, self.measured_species, self._full_light
+        )
 
     def skeleton(self, tree_id: int, season: Literal["summer", "winter"] = "summer") -> Skeleton:
         """The shape of a living tree.
@@ -447,14 +450,7 @@ class Stand:
 
     def row_of(self, tree_id: int) -> int:
         """Find the row of a living tree."""
-        row = int(np.searchsorted(self.rows.tree_id, tree_id))
-        if row == len(self.rows.tree_id) or self.rows.tree_id[row] != tree_id:
-            raise InputError(
-                f"no living tree has the id {tree_id}",
-                where="Stand",
-                expected=f"one of the {len(self.rows.tree_id)} ids in stand.trees.tree_id",
-            )
-        return row
+        return table.row_of(self.rows, tree_id, where="Stand")
 
     def _sample_serials(self) -> dict[int, NDArray[np.int32]]:
         """Serials of the sample trees' metamers before the year, to tell what was shed."""

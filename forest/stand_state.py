@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.trees import table
-from forest.yearbook import Event
+from forest.yearbook import Event, Loss
 
 if TYPE_CHECKING:
     from forest.stand import Stand
@@ -30,6 +30,7 @@ def take_state(stand: Stand) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         "pending": [
             [None if value != value else value for value in event] for event in stand.pending
         ],
+        "losses": {str(tree_id): list(loss) for tree_id, loss in stand.losses.items()},
     }
     return arrays, meta
 
@@ -43,6 +44,7 @@ def put_state(stand: Stand, arrays: dict[str, NDArray[Any]], meta: dict[str, Any
         Event._make(np.nan if value is None else value for value in event)
         for event in meta["pending"]
     ]
+    stand.losses = {int(i): Loss._make(loss) for i, loss in meta["losses"].items()}
     stand.rows = table.Trees(
         **{name: np.array(arrays[f"tree_{name}"]) for name in table.Trees._fields}
     )

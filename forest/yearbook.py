@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.growth import budget
-from forest.measure.rings import ring_rows, ring_widths
+from forest.measure.rings import RingYear, breast_ring_widths, ring_rows
 from forest.measure.stand import Flows, Plot, stand_rows
 from forest.measure.trees import TreeMeasures
 from forest.record.samples import SampleShape, SampleYear
@@ -51,6 +51,25 @@ class Event(NamedTuple):
         )
 
 
+class Loss(NamedTuple):
+    """What acts since the last record took from a sample tree.
+
+    Attributes
+    ----------
+    species : int
+        Index into the scenario's species.
+    x, y : float
+        Place of its stem base, m.
+    serials : list of int
+        Serial numbers of the metamers that went.
+    """
+
+    species: int
+    x: float
+    y: float
+    serials: list[int]
+
+
 class YearRecord(NamedTuple):
     """One year of a stand.
 
@@ -75,6 +94,7 @@ def record_year(
     dead: list[tuple[int, str]],
     accounts: NDArray[np.float64],
     serials_before: dict[int, NDArray[np.int32]],
+    rings: RingYear,
 ) -> YearRecord:
     """Write down the year that has just been grown.
 
@@ -89,7 +109,9 @@ def record_year(
     accounts : float64 (rows, ACCOUNTS)
         The year's carbon accounts, kg per tree.
     serials_before : dict
-        Serials of the sample trees' metamers before the year.
+        Serials of the sample trees' metamers before the year, after acts.
+    rings : RingYear
+        What the year's rings are read from.
     """
     rows = stand.rows
     alive = np.ones(len(rows.tree_id), np.bool_)
@@ -105,7 +127,7 @@ def record_year(
     stand.sample_ids.extend(chosen)
     plot = stand.scenario.plot
     tables = {
-        "trees": _tree_rows(stand, living, of_living),
+        "trees": _tree_rows(stand, living, of_living, rings),
         "stand": stand_rows(
             stand.year,
             of_living,
@@ -117,9 +139,7 @@ def record_year(
             stand.floor_light,
         ),
         "events": _event_rows(stand.year, events),
-        "rings": ring_rows(
-            stand.year, stand.steps, living, of_living, *_thick_sides(stand, living, of_living)
-        ),
+        "rings": _ring_rows(stand, living, of_living, rings),
         "carbon": _carbon_rows(stand, accounts),
     }
     if stand.mechanics is not None:
@@ -127,7 +147,9 @@ def record_year(
     return YearRecord(stand.year, tables, _sample_years(stand, dead, serials_before))
 
 
-def _tree_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Columns:
+def _tree_rows(
+    stand: Stand, trees: table.Trees, measures: TreeMeasures, rings: RingYear
+) -> Columns:
     n = len(trees.tree_id)
     columns: Columns = {
         "year": np.full(n, stand.year, np.int32),
@@ -137,21 +159,28 @@ def _tree_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Colu
         "y_m": trees.y,
         "age": stand.steps - trees.birth,
         "status": np.zeros(n, np.int8),
-        "ring_width_mm": ring_widths(trees, measures),
+        "ring_width_mm": breast_ring_widths(stand.arena.metamers, trees, measures, rings),
     }
     columns.update(measures.columns())
     return columns
 
 
-def _thick_sides(
-    stand: Stand, trees: table.Trees, measures: TreeMeasures
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | tuple[None, None]:
-    """Give eccentricity and thick side (degrees) of the rings at breast height."""
+def _ring_rows(
+    stand: Stand, trees: table.Trees, measures: TreeMeasures, rings: RingYear
+) -> Columns:
+    output = stand.scenario.output
+    heights = np.array(output.ring_heights_m, np.float64)
+    metamers = stand.arena.metamers
+    columns = ring_rows(metamers, trees, measures, heights, output.ring_crown_base, rings)
+    if not columns:
+        return {}
+    place = columns.pop("metamer")
     if stand.mechanics is None:
-        return None, None
-    place = trees.start + np.maximum(measures.breast_metamer, 0)
+        round_, no_side = np.zeros(len(place)), np.full(len(place), np.nan)
+        return {**columns, "eccentricity": round_, "thick_side_deg": no_side}
     eccentricity, azimuth = stand.mechanics.thick_sides(stand.arena, place)
-    return eccentricity, np.degrees(azimuth) % 360.0
+    side = np.degrees(azimuth) % 360.0
+    return {**columns, "eccentricity": eccentricity, "thick_side_deg": side}
 
 
 def _stability_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Columns:
@@ -232,20 +261,44 @@ def choose_samples(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> 
 def _sample_years(
     stand: Stand, dead: list[tuple[int, str]], before: dict[int, NDArray[np.int32]]
 ) -> dict[int, SampleYear]:
-    """Tell the year of each living sample tree; one that dies loses all its metamers."""
+    """Tell the year of each sample tree; one that dies or is felled loses all its metamers."""
     rows = stand.rows
     dies = {row for row, _ in dead}
     years = {}
     for tree_id in stand.sample_ids:
         row = int(np.searchsorted(rows.tree_id, tree_id))
         known = before.get(tree_id)
-        if row == len(rows.tree_id) or rows.tree_id[row] != tree_id:
-            continue
-        years[tree_id] = _sample_year(stand, row, known, row in dies)
+        loss = stand.losses.get(tree_id)
+        if row < len(rows.tree_id) and rows.tree_id[row] == tree_id:
+            cut = [] if loss is None else loss.serials
+            years[tree_id] = _sample_year(stand, row, known, cut, row in dies)
+        elif loss is not None:
+            years[tree_id] = _felled_year(loss)
     return years
 
 
-def _sample_year(stand: Stand, row: int, known: NDArray[np.int32] | None, dies: bool) -> SampleYear:
+def _felled_year(loss: Loss) -> SampleYear:
+    """Tell the last year of a felled tree: nothing is left to measure."""
+    none = np.empty(0, np.int32)
+    return SampleYear(
+        species=loss.species,
+        base=np.array([loss.x, loss.y, 0.0]),
+        new_serial=none,
+        new_parent_serial=none,
+        new_end=np.empty((0, 3), np.float32),
+        new_order=np.empty(0, np.uint8),
+        new_main=np.empty(0, np.bool_),
+        new_birth_year=none,
+        dead_serial=np.array(sorted(loss.serials), np.int32),
+        serial=none,
+        radius=np.empty(0, np.float32),
+        leafy=np.empty(0, np.bool_),
+    )
+
+
+def _sample_year(
+    stand: Stand, row: int, known: NDArray[np.int32] | None, cut: list[int], dies: bool
+) -> SampleYear:
     rows = stand.rows
     start, n = int(rows.start[row]), int(rows.size[row])
     part = slice(start, start + n)
@@ -261,6 +314,7 @@ def _sample_year(stand: Stand, row: int, known: NDArray[np.int32] | None, dies: 
         new = serial > known[-1]
         place = np.minimum(np.searchsorted(serial, known), n - 1)
         lost = known[serial[place] != known]
+    lost = np.union1d(lost, np.array(cut, np.int32))
     state = arena.state[part]
     exponent = float(stand.pipe_exponent[rows.species[row]])
     if dies:

@@ -12,6 +12,7 @@ import h5py
 import pytest
 from hypothesis import given, settings
 
+from forest.record.run import open_run
 from tests.scenario.test_fuzz import CSV, TOML, mutated
 from tests.tiny import TOML as TINY
 from tests.tiny import forest, write_tiny
@@ -72,6 +73,35 @@ def test_scenario(folder: Path, old: str, new: str, says: str) -> None:
     path.write_text(TINY.replace(old, new, 1))
     refused(folder, "run", path, "--out", folder / "new.h5", says=says)
     refused(folder, "check", path, says="wrong.toml")
+
+
+@pytest.mark.parametrize(
+    ("act", "says"),
+    [
+        ("kind = 'fell', year = 1999, tree_ids = [1]", "acts[0].year: 1999 is not a year"),
+        ("kind = 'fell', year = 2001, tree_ids = [99]", "acts[0].tree_ids in 2001: no living tree"),
+        ("kind = 'prune', year = 2001, tree_id = 1, metamer = 7", "acts[0].metamer in 2001"),
+        ("kind = 'prune', year = 2001, tree_id = 1, below = 1", "did you mean 'below_m'?"),
+        ("kind = 'plant', year = 2001, x_m = [1], y_m = [99], species = 'x'", "acts[0].species[0]"),
+    ],
+)
+def test_acts(folder: Path, act: str, says: str) -> None:
+    """What is wrong in the first year is known before a file is written."""
+    (folder / "acts.toml").write_text(TINY + f"acts = [{{ {act} }}]")
+    refused(folder, "run", folder / "acts.toml", "--out", folder / "new.h5", says=says)
+
+
+def test_an_act_that_fails_in_its_year_loses_no_year(folder: Path) -> None:
+    path, out = folder / "acts.toml", folder / "new.h5"
+    path.write_text(TINY + "acts = [{ kind = 'fell', year = 2004, tree_ids = [99] }]")
+    code, _, err = forest("run", path, "--out", out)
+    assert code == 2
+    assert [line for line in err.splitlines() if "error" in line] == [
+        "forest: error: acts[0].tree_ids in 2004: no living tree has the id 99; expected one of "
+        "1, 2, 3, 4, 5, 6, 7, 8, ... (10 trees)"
+    ]
+    with open_run(out) as run:
+        assert run.years.tolist() == [2001, 2002, 2003]
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,7 @@ def test_seedlings_may_be_planted_leaning(stand: Stand) -> None:
     [
         ({"lean_deg": 90.0}, "lean_deg = 90.0.*0 to 85"),
         ({"lean_deg": [1.0, 2.0]}, "one for all trees or one for each"),
-        ({"lean_azimuth_deg": np.nan}, "lean_azimuth_deg.*-360 to 360"),
+        ({"lean_azimuth_deg": np.nan}, "lean_azimuth_deg = nan.*-360 to 360"),
     ],
 )
 def test_leaning_is_checked(stand: Stand, leans: dict[str, Any], says: str) -> None:
@@ -181,7 +181,33 @@ def test_pruning_is_checked(stand: Stand) -> None:
         stand.prune(1, 123456)
     with pytest.raises(InputError, match="carries the whole tree"):
         stand.prune(1, int(stand.skeleton(1).serial[0]))
+    with pytest.raises(InputError, match="expected one of below_m, side_deg"):
+        stand.prune(1)
+    with pytest.raises(InputError, match=r"Stand\.prune: side: .*did you mean 'side_deg'"):
+        stand.prune(1, side=270)
+    with pytest.raises(InputError, match=r"Stand\.prune: below_m: nan"):
+        stand.prune(1, below_m=np.nan)
+    with pytest.raises(InputError, match="metamer and below_m exclude each other"):
+        stand.prune(1, 2, below_m=1.0)
+    with pytest.raises(InputError, match="no metamer 123456"):
+        stand.prune(1, [1, 123456])
+    assert stand.prune(1, []) == 0
+    assert stand.prune(1, side_deg=0, from_m=100) == 0
     assert not stand.pending
+
+
+def test_several_metamers_are_one_pruning(stand: Stand) -> None:
+    """One may stand on another; a tree that is lift-pruned has no branch below that height."""
+    before = stand.skeleton(1)
+    branch = int(np.flatnonzero(before.order == 1)[0])
+    above = int(np.flatnonzero(before.parent == branch)[0])
+    stand.prune(1, [int(before.serial[above]), int(before.serial[branch])])
+    assert not np.isin(before.serial[[above, branch]], stand.skeleton(1).serial).any()
+    assert [event.kind for event in stand.pending] == ["pruned"]
+    stand.prune(1, below_m=0.5)
+    after = stand.skeleton(1)
+    on_trunk = (after.order == 1) & (after.order[after.parent] == 0)
+    assert (after.start[on_trunk, 2] >= 0.5).all()
 
 
 def test_acts_before_a_checkpoint_are_in_it(stand: Stand) -> None:

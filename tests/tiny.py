@@ -80,7 +80,7 @@ def assert_same_runs(one: Run, other: Run) -> None:
         assert_frame_equal(one.read(table), other.read(table), check_exact=True)
     assert one.samples == other.samples
     for tree_id in one.samples:
-        year = int(one.years[-1])
+        year = int(one.sample_years(tree_id)[-1])  # the last one that it lived
         _assert_equal_tuples(
             vars(one.skeleton(tree_id, year)).values(),
             vars(other.skeleton(tree_id, year)).values(),

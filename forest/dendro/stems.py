@@ -74,6 +74,8 @@ def stem_rings(rings: pd.DataFrame) -> list[StemRings]:
         if name not in rings.columns:
             hint = nearest(name, map(str, rings.columns)) if len(rings.columns) else ""
             raise InputError(f"no column '{name}'", where="rings", expected=hint)
+    if "place" in rings.columns:  # where the crown begins is other wood every year
+        rings = rings[rings["place"] == "height"]
     if not len(rings):
         raise InputError("no rings", where="rings", expected="at least one row")
     year, tree = (rings[name].to_numpy(np.int64) for name in ("year", "tree_id"))

@@ -21,7 +21,7 @@ from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.species import Species
 from forest.trees.metamers import CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
-from forest.trees.table import Trees
+from forest.trees.table import DISCS, Trees
 
 #: Height at which dbh and rings are measured, m.
 BREAST_HEIGHT_M = 1.3
@@ -29,6 +29,9 @@ BREAST_HEIGHT_M = 1.3
 _BINS = 32  # fixed, so that results do not depend on the number of threads
 _QUARTER_PI = 0.25 * np.pi
 _NAN = np.nan
+
+
+NO_HEIGHTS: NDArray[np.float64] = np.empty(0)
 
 
 class MeasureSpecies(NamedTuple):
@@ -81,17 +84,17 @@ class TreeMeasures(NamedTuple):
     buds: NDArray[np.int32]  # living sites
     breast_metamer: NDArray[np.int32]  # metamer at breast height, in the tree's extent; or -1
     breast_serial: NDArray[np.int32]  # its serial; -1 while there is none
-    breast_birth: NDArray[np.int32]  # step in which that metamer was made; -1 while there is none
-    breast_radius_m: NDArray[np.float32]  # under bark at breast height; 0 while there is none
+    disc_metamer: NDArray[np.int32]  # (n, DISCS + 1) those at the rings' heights and, last, at the
+    # crown's base, in the tree's extent; -1 for none
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Give what is measured, by column, without what only helps to find breast height."""
-        named = self._asdict().items()
-        return {name: column for name, column in named if not name.startswith("breast_")}
+        """Give what is measured, by column, without what only helps to find rings."""
+        hidden = ("breast_metamer", "breast_serial", "disc_metamer")
+        return {name: column for name, column in self._asdict().items() if name not in hidden}
 
 
 @njit
-def _octagon(reach: Any) -> Any:
+def octagon(reach: Any) -> Any:
     """Give mean radius and area of the octagon whose corners are the reaches (squared).
 
     `reach` is indexed by the bits of a sector: 1 steep (|y| > |x|), 2 x < 0, 4 y < 0.
@@ -110,7 +113,7 @@ def _octagon(reach: Any) -> Any:
 
 @njit
 def _measure_tree(
-    metamers: Any, trees: Any, species: Any, full_light: Any, t: Any, out: Any
+    metamers: Any, trees: Any, species: Any, full_light: Any, heights: Any, t: Any, out: Any
 ) -> Any:
     """Measure tree `t` in one forward scan of its extent."""
     first = trees.start[t]
@@ -135,6 +138,9 @@ def _measure_tree(
     sold_wood = 0.0
     crossing = -1
     kept = -1
+    discs = out.disc_metamer[t]
+    discs[:] = -1
+    found = np.zeros(len(heights), np.bool_)  # still the wood of last year
     for j in range(n):
         i = first + j
         state = metamers.state[i]
@@ -168,12 +174,23 @@ def _measure_tree(
                 sold_wood += square * min(above, length)
             if crossing < 0 and z >= BREAST_HEIGHT_M:
                 crossing = j
+            for k in range(len(heights)):
+                if metamers.serial[i] == trees.disc_serial[t, k]:
+                    discs[k] = j
+                    found[k] = True
+                elif not found[k] and discs[k] < 0 and z >= heights[k]:
+                    discs[k] = j
 
+    if buds > 0:
+        j = stem
+        while j >= 0 and metamers.tip[first + j, 2] >= crown_base:
+            discs[-1] = j
+            j = metamers.parent[first + j]
     out.metamers[t] = n
     out.buds[t] = buds
     out.height_m[t] = height
     out.crown_base_m[t] = crown_base if buds > 0 else _NAN
-    out.crown_radius_m[t], out.crown_area_m2[t] = _octagon(reach)
+    out.crown_radius_m[t], out.crown_area_m2[t] = octagon(reach)
     out.light[t] = light / (buds * full_light) if buds > 0 else _NAN
     leaves = buds * species.leaf_area_m2[kind]
     out.leaf_area_m2[t] = leaves
@@ -198,8 +215,6 @@ def _measure_tree(
         out.basal_area_m2[t] = 0.0
         out.breast_metamer[t] = -1
         out.breast_serial[t] = -1
-        out.breast_birth[t] = -1
-        out.breast_radius_m[t] = 0.0
     else:
         under = np.float64(metamers.pipe[first + breast]) ** (1.0 / exponent)
         dbh = under * over_bark
@@ -207,8 +222,6 @@ def _measure_tree(
         out.basal_area_m2[t] = _QUARTER_PI * dbh * dbh
         out.breast_metamer[t] = breast
         out.breast_serial[t] = metamers.serial[first + breast]
-        out.breast_birth[t] = metamers.birth[first + breast]
-        out.breast_radius_m[t] = 0.5 * under
 
 
 @driver
@@ -219,17 +232,22 @@ def _measure_all(
     trees: Any,
     species: Any,
     full_light: Any,
+    heights: Any,
     by_size: Any,
     out: Any,
 ) -> None:
     """Measure all trees; they are dealt to bins from the largest to the smallest."""
     for b in range(first, _BINS, step):
         for k in range(b, len(by_size), _BINS):
-            _measure_tree(metamers, trees, species, full_light, by_size[k], out)
+            _measure_tree(metamers, trees, species, full_light, heights, by_size[k], out)
 
 
 def measure_trees(
-    metamers: Metamers, trees: Trees, species: MeasureSpecies, full_light: float = 1.0
+    metamers: Metamers,
+    trees: Trees,
+    species: MeasureSpecies,
+    full_light: float = 1.0,
+    heights: NDArray[np.float64] = NO_HEIGHTS,
 ) -> TreeMeasures:
     """Measure every tree of the table.
 
@@ -243,6 +261,8 @@ def measure_trees(
         One entry per species of the scenario.
     full_light : float
         Light Q of an unshaded bud (C of Palubicki et al. 2009, 4.1); `light` is relative to it.
+    heights : float64 (k,)
+        Heights of the stem at which rings are told, m; at most `forest.trees.table.DISCS`.
 
     Returns
     -------
@@ -262,10 +282,10 @@ def measure_trees(
     """
     n = len(trees.tree_id)
     columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in TreeMeasures._fields}
-    for name in ("metamers", "buds", "breast_metamer", "breast_serial", "breast_birth"):
+    for name in ("metamers", "buds", "breast_metamer", "breast_serial"):
         columns[name] = np.empty(n, np.int32)
-    columns["breast_radius_m"] = np.empty(n, np.float32)
+    columns["disc_metamer"] = np.empty((n, DISCS + 1), np.int32)
     out = TreeMeasures(**columns)
     by_size = np.argsort(-trees.size, kind="stable")
-    in_threads(_measure_all, metamers, trees, species, float(full_light), by_size, out)
+    in_threads(_measure_all, metamers, trees, species, float(full_light), heights, by_size, out)
     return out

@@ -81,7 +81,7 @@ class Run:
         self._ends = {name: np.concatenate(([0], steps[name])) for name in self.tables}
         self._frames: dict[str, pd.DataFrame] = {}
         ids = sorted(int(tree_id) for tree_id in file["samples"])
-        self.samples = tuple(tree_id for tree_id in ids if len(self._sample_years(tree_id)))
+        self.samples = tuple(tree_id for tree_id in ids if len(self.sample_years(tree_id)))
 
     @property
     def trees(self) -> pd.DataFrame:
@@ -225,7 +225,7 @@ class Run:
             raise InputError(
                 f"tree {tree_id} is no sample tree", where=str(self.path), expected=expected
             )
-        years = self._sample_years(tree_id)
+        years = self.sample_years(tree_id)
         if year not in years:
             raise InputError(
                 f"tree {tree_id} is not on record in {year}",
@@ -234,6 +234,14 @@ class Run:
             )
         with damage_reported(self.path):
             return self._shape(tree_id, year)
+
+    def sample_years(self, tree_id: int) -> NDArray[np.int32]:
+        """List the years at whose end a sample tree lived, of the whole years on file."""
+        steps = self._file[f"samples/{tree_id}/steps"]
+        years: NDArray[np.int32] = steps["year"][:]
+        living = np.diff(steps["radii"][:], prepend=0) > 0
+        living_years: NDArray[np.int32] = years[living & np.isin(years, self.years)]
+        return living_years
 
     def close(self) -> None:
         """Close the file; tables already read stay."""
@@ -278,14 +286,6 @@ class Run:
         first = int(np.searchsorted(self.years, years[0], side="left"))
         last = int(np.searchsorted(self.years, years[1], side="right"))
         return int(ends[first]), int(ends[max(first, last)])
-
-    def _sample_years(self, tree_id: int) -> NDArray[np.int32]:
-        """List the years at whose end a sample tree lived, of the whole years on file."""
-        steps = self._file[f"samples/{tree_id}/steps"]
-        years: NDArray[np.int32] = steps["year"][:]
-        living = np.diff(steps["radii"][:], prepend=0) > 0
-        living_years: NDArray[np.int32] = years[living & np.isin(years, self.years)]
-        return living_years
 
     def _shape(self, tree_id: int, year: int) -> Skeleton:
         group = self._file[f"samples/{tree_id}"]

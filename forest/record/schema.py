@@ -26,6 +26,9 @@ CAUSES = (
     "no_buds",
 )
 
+#: Discs at heights that the scenario names, or where the crown begins in the year.
+RING_PLACES = ("height", "crown_base")
+
 #: Levels of a column of species: the run's own list, without or with the entry for all of them.
 SPECIES = ("<species>",)
 SPECIES_OR_ALL = ("<species>", "all")
@@ -178,6 +181,7 @@ RINGS = Table(
         _YEAR,
         _TREE,
         _SPECIES,
+        Column("place", "int8", "", "what the disc's height stands for", levels=RING_PLACES),
         Column("stem_height_m", "float32", "m", "height of the disc above the ground"),
         Column("cambial_age", "int32", "years", "rings from the pith, this one included"),
         _number("width_mm", "mm", "mean width of the ring; the widths add up to the wood radius"),

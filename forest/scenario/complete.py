@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import ValidationInfo
@@ -90,3 +91,18 @@ def check_inside(x: float, y: float, plot: Plot, *, key: str, label: str = "") -
             key=key,
             expected=f"x_m 0 to {plot.size_m[0]:g}, y_m 0 to {plot.size_m[1]:g}",
         )
+
+
+def check_spots(trees: Sequence[PlantedTree], plot: Plot, *, key: str) -> None:
+    """Refuse trees outside the plot, and two on one spot; `key` is that of their list."""
+    spots = placing.Spots(plot.size_m, placing.SAME_SPOT_M, periodic=plot.boundary == "periodic")
+    for i, tree in enumerate(trees):
+        check_inside(tree.x_m, tree.y_m, plot, key=f"{key}[{i}]")
+        other = spots.neighbour(tree.x_m, tree.y_m)
+        if other is not None:
+            raise Refusal(
+                f"stands on the spot of {key.rpartition('.')[2]}[{other}]",
+                key=f"{key}[{i}]",
+                expected="0.01 m or more apart",
+            )
+        spots.take(tree.x_m, tree.y_m, i)

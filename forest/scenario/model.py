@@ -15,6 +15,7 @@ Point = tuple[Coordinate, Coordinate, Coordinate]
 _Edge = Annotated[float, Field(ge=0.5, le=10000)]
 _Spacing = Annotated[float, Field(ge=0.05, le=10000)]
 _Extent = Annotated[float, Field(gt=0, le=1e5)]
+_DiscHeight = Annotated[float, Field(gt=0, le=150)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
 _TableName = Literal["trees", "stand", "events", "rings", "carbon", "stability"]
@@ -375,6 +376,10 @@ class Output(Table):
         max_length=6,
     )
     sample_trees: SampleTrees = SampleTrees()
+    ring_heights_m: tuple[_DiscHeight, ...] = quantity(
+        (0.3, 1.3, 5.0, 10.0), "heights of the stem whose rings are told", unit="m", max_length=8
+    )
+    ring_crown_base: bool = quantity(True, "tell the ring where the crown begins as well", unit="")
     checkpoint_every_years: int = quantity(
         10, "years between two checkpoints", unit="year", ge=1, le=10000
     )

@@ -15,7 +15,8 @@ from pydantic import PrivateAttr, ValidationError, ValidationInfo, field_validat
 
 from forest.errors import nearest
 from forest.scenario import placing
-from forest.scenario.complete import check_inside, complete, embed_stem_map
+from forest.scenario.acts import Act, check_acts
+from forest.scenario.complete import check_spots, complete, embed_stem_map
 from forest.scenario.model import (
     Environment,
     Explicit,
@@ -86,6 +87,9 @@ class Scenario(Table):
     planting: Planting
     obstacles: tuple[Obstacle, ...] = quantity(
         (), "what blocks growth and casts shade", unit="", max_length=10000
+    )
+    acts: tuple[Act, ...] = quantity(
+        (), "what is pruned, felled and planted between years", unit="", max_length=100_000
     )
     output: Output = Output()
 
@@ -227,24 +231,19 @@ class Scenario(Table):
         return self
 
     def _check_trees(self, planting: Explicit) -> None:
-        periodic = self.plot.boundary == "periodic"
-        spots = placing.Spots(self.plot.size_m, placing.SAME_SPOT_M, periodic=periodic)
         for i, tree in enumerate(planting.trees):
             key = f"planting.trees[{i}]"
-            check_inside(tree.x_m, tree.y_m, self.plot, key=key)
             if not tree.species and len(self.species) > 1:
                 raise Refusal("missing key 'species'", key=key, expected="a species' name")
             if tree.species and tree.species not in self.species:
                 hint = nearest(tree.species, self.species)
                 raise Refusal(f"unknown species {tree.species!r}, {hint}", key=f"{key}.species")
-            other = spots.neighbour(tree.x_m, tree.y_m)
-            if other is not None:
-                raise Refusal(
-                    f"stands on the spot of trees[{other}]",
-                    key=key,
-                    expected="0.01 m or more apart",
-                )
-            spots.take(tree.x_m, tree.y_m, i)
+        check_spots(planting.trees, self.plot, key="planting.trees")
+
+    @model_validator(mode="after")
+    def _acts_fit(self) -> Scenario:
+        check_acts(self.acts, self.plot, self.species, self.calendar)
+        return self
 
     @model_validator(mode="after")
     def _samples_exist(self) -> Scenario:
@@ -280,6 +279,11 @@ class Scenario(Table):
         raise TypeError(planting)  # a stem map has become explicit when the scenario was read
 
     # --- use -------------------------------------------------------------------------------
+
+    @property
+    def calendar(self) -> range:
+        """The calendar years of the run."""
+        return range(self.start_year, self.start_year + self.years)
 
     @property
     def species_list(self) -> tuple[Species, ...]:
@@ -337,7 +341,7 @@ class Scenario(Table):
             trees = self.planting.trees
             lean = np.array([tree.lean_deg for tree in trees])
             return lean, np.array([tree.lean_azimuth_deg for tree in trees])
-        upright = np.zeros(len(self.planting_positions()[0]))
+        upright = np.zeros(self._count_trees())
         return upright, upright
 
     def with_overrides(self, overrides: Iterable[str]) -> Scenario:

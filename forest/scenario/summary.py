@@ -6,6 +6,9 @@ import numpy as np
 
 from forest.scenario.scenario import Scenario
 
+#: Acts that are named one by one.
+_MOST_ACTS = 6
+
 
 def summary(scenario: Scenario) -> list[tuple[str, str]]:
     """Say in a few lines what a scenario would grow.
@@ -36,7 +39,17 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("environment", " + ".join(parts)),
         ("bud fate", scenario.growth.bud_fate),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
+        ("acts", _acts(scenario)),
         ("seed", str(scenario.seed)),
         ("tables", ", ".join(scenario.output.tables) or "none"),
         ("sha256", scenario.digest()),
     ]
+
+
+def _acts(scenario: Scenario) -> str:
+    """Name the acts in the order of their years, or the first and last of many."""
+    acts = sorted(scenario.acts, key=lambda act: act.year)
+    named = [f"{act.kind} in {act.year}" for act in acts]
+    if len(named) > _MOST_ACTS:
+        named[_MOST_ACTS - 1 : -1] = [f"... ({len(acts)} in all)"]
+    return ", ".join(named) or "none"

@@ -7,6 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.errors import InputError
+
+#: Ids that a message lists before it breaks off.
+_LISTED = 8
+
+#: Heights at which rings can be told.
+DISCS = 8
+
 #: Columns of the table: name -> (dtype, items, meaning).
 COLUMNS: dict[str, tuple[type, int, str]] = {
     "tree_id": (np.int32, 1, "number of the tree, from 1, never used twice"),
@@ -25,7 +33,7 @@ COLUMNS: dict[str, tuple[type, int, str]] = {
     "reserve": (np.float64, 1, "stored dry mass, kg"),
     "bad_years": (np.int32, 1, "years in a row of a net income below the limit"),
     "breast_serial": (np.int32, 1, "serial of the metamer at 1.3 m; -1 while there is none"),
-    "breast_radius": (np.float32, 1, "radius under bark there at the end of last year, m"),
+    "disc_serial": (np.int32, DISCS, "serials of the metamers whose rings are told; -1 for none"),
 }
 
 
@@ -48,7 +56,7 @@ class Trees(NamedTuple):
     reserve: NDArray[np.float64]
     bad_years: NDArray[np.int32]
     breast_serial: NDArray[np.int32]
-    breast_radius: NDArray[np.float32]
+    disc_serial: NDArray[np.int32]
 
 
 def empty(n: int = 0) -> Trees:
@@ -74,3 +82,23 @@ def keep(trees: Trees, rows: NDArray[np.bool_]) -> Trees:
         name: np.ascontiguousarray(column[rows]) for name, column in trees._asdict().items()
     }
     return Trees(**columns)
+
+
+def row_of(trees: Trees, tree_id: int, *, where: str) -> int:
+    """Find the row of a living tree; `where` names the act that asks for it in messages.
+
+    Raises
+    ------
+    InputError
+        If no living tree has that id.
+    """
+    row = int(np.searchsorted(trees.tree_id, tree_id))
+    if row == len(trees.tree_id) or trees.tree_id[row] != tree_id:
+        living = ", ".join(str(i) for i in trees.tree_id[:_LISTED])
+        more = f", ... ({len(trees.tree_id)} trees)" if len(trees.tree_id) > _LISTED else ""
+        raise InputError(
+            f"no living tree has the id {tree_id}",
+            where=where,
+            expected=f"one of {living}{more}" if living else "a living tree, but there is none",
+        )
+    return row

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from forest.measure.trees import MeasureSpecies
 from forest.trees.metamers import CONTINUED, LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
+
+
+def stem_of(m: Metamers, at: list[int]) -> list[int]:
+    """List the metamers of the stem; `at` are the tree's places in the arena."""
+    stem = []
+    children = [j for j in range(len(at)) if m.parent[at[j]] == -1]
+    while children:
+        here = max(children, key=lambda j: float(m.pipe[at[j]]))
+        stem.append(here)
+        children = [j for j in range(len(at)) if m.parent[at[j]] == here]
+        if m.state[at[here]] & CONTINUED:
+            children = [j for j in children if m.state[at[j]] & MAIN]
+    return stem
 
 
 def measure_tree(
@@ -24,15 +35,7 @@ def measure_tree(
     tip = [tuple(float(c) for c in m.tip[i]) for i in at]
     sites = [bool(m.state[i] & TERMINAL) + bool(m.state[i] & LATERAL) for i in at]
 
-    stem = []
-    children = [j for j in range(n) if m.parent[at[j]] == -1]
-    while children:
-        here = max(children, key=lambda j: diameter[j])
-        stem.append(here)
-        children = [j for j in range(n) if m.parent[at[j]] == here]
-        if m.state[at[here]] & CONTINUED:
-            children = [j for j in children if m.state[at[j]] & MAIN]
-
+    stem = stem_of(m, at)
     breast = [j for j in range(n) if m.serial[at[j]] == trees.breast_serial[row]]
     breast += [j for j in stem if tip[j][2] >= 1.3]
     reach = [0.0] * 8
@@ -77,6 +80,25 @@ def measure_tree(
         "metamers": n,
         "buds": sum(sites),
         "breast_serial": int(m.serial[at[breast[0]]]) if breast else -1,
-        "breast_birth": int(m.birth[at[breast[0]]]) if breast else -1,
-        "breast_radius_m": np.float32(diameter[breast[0]] / 2) if breast else 0.0,
+        "breast_metamer": breast[0] if breast else -1,
     }
+
+
+def discs(m: Metamers, trees: Trees, heights: list[float], row: int) -> list[int]:
+    """Find the metamers whose rings are told: last year's wood, or what reaches the height first;
+    at last, the lowest of the stem that is as high as the lowest living site.
+    """
+    at = [int(trees.start[row]) + j for j in range(int(trees.size[row]))]
+    stem = stem_of(m, at)
+    z = [float(m.tip[i, 2]) for i in at]
+    found = []
+    for k, height in enumerate(heights):
+        old = [j for j in stem if m.serial[at[j]] == trees.disc_serial[row, k]]
+        found.append((old + [j for j in stem if z[j] >= height] + [-1])[0])
+    sites = [z[j] for j in range(len(at)) if m.state[at[j]] & (TERMINAL | LATERAL)]
+    above: list[int] = []
+    for j in reversed(stem):
+        if not sites or z[j] < min(sites):
+            break
+        above.append(j)
+    return [*found, above[-1] if above else -1]

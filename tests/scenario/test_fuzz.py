@@ -41,6 +41,22 @@ species = "picea_abies"
 kind = "box"
 min_m = [0, 0, 0]
 max_m = [1, 1, 1]
+[[acts]]
+kind = "prune"
+year = 2003
+tree_ids = [1, 2]
+side_deg = 90
+within_deg = 30
+[[acts]]
+kind = "fell"
+year = 2004
+tree_ids = [3]
+[[acts]]
+kind = "plant"
+year = 2005
+x_m = [1, 2]
+y_m = [3, 4]
+species = ["picea_abies"]
 [output]
 tables = ["trees"]
 sample_trees = {ids = [1], dbh_quantiles = [0.5], at_year = 2009}

@@ -13,7 +13,14 @@ from forest.scenario import Scenario, describe
 from forest.species import load_species
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-SHIPPED = ["finnish_pines", "mixed_stand", "paper_tree", "saxony_spruce", "self_thinning"]
+SHIPPED = [
+    "finnish_pines",
+    "mixed_stand",
+    "paper_tree",
+    "pruned_pine",
+    "saxony_spruce",
+    "self_thinning",
+]
 
 
 def small(**changes: Any) -> Scenario:
