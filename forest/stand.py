@@ -17,11 +17,12 @@ from forest.growth import budget
 from forest.growth.allocate import allocate
 from forest.growth.dealing import Deal, Workbench, deal
 from forest.growth.parameters import Year, species_traits
-from forest.growth.pipes import thicken
+from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
+from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.stand_state import put_state, take_state
 from forest.trees import table
@@ -92,7 +93,8 @@ class Stand:
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
-            self.mechanics = Mechanics(spec, self.species, self.pipe_exponent)
+            plot = Plot(*scenario.plot.size_m, scenario.plot.boundary == "periodic")
+            self.mechanics = Mechanics(spec, self.species, self.pipe_exponent, plot)
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -196,6 +198,9 @@ class Stand:
         return RingYear(self.year, self.steps, self._pipes_before, self.pipe_exponent)
 
     def _thicken(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
+        wind_need = NO_NEED
+        if self.mechanics is not None and self.mechanics.wind_growth:
+            wind_need = self.mechanics.feel_wind(self.arena, self.rows, shared)
         thicken(
             self.arena.metamers,
             self.rows,
@@ -204,6 +209,7 @@ class Stand:
             self._traits,
             year,
             accounts,
+            wind_need,
         )
         self._lap("thicken")
 
@@ -436,7 +442,8 @@ class Stand:
         row = self.row_of(tree_id)
         kind = int(self.rows.species[row])
         metamers, rows = self.arena.metamers, self.rows
-        if season == "winter" and self.mechanics is not None:
+        bent = int(rows.birth[row]) < self.steps  # a seedling just planted has no rods yet
+        if season == "winter" and self.mechanics is not None and bent:
             metamers, rows = self.mechanics.winter(self.arena, self.rows, row)
             row = 0
         return skeleton_of(

@@ -15,7 +15,7 @@ import typer
 from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
-from forest.cli.reading import info, picture, table
+from forest.cli.reading import info, picture, stability, table
 from forest.cli.shared import Stopped
 
 # The class of all wrong usage; which module holds it depends on typer's version.
@@ -36,7 +36,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (run, sweep, check, table, info, export, species, picture, version):
+for _command in (run, sweep, check, table, stability, info, export, species, picture, version):
     app.command()(_command)
 
 

@@ -96,8 +96,23 @@ class Mechanics(Table):
         1e-4, "turn of a metamer that may be left to equilibrium", unit="rad", ge=1e-9, le=0.1
     )
     wind_m_s: float = quantity(
-        0.0, "wind at the canopy's top for which stresses are told", unit="m/s", ge=0, le=100
+        0.0,
+        "usual mean wind of a storm at the top of an open canopy, for which stresses are told",
+        unit="m/s",
+        ge=0,
+        le=100,
     )
+    wind_growth: bool = quantity(
+        False,
+        "stems that this wind stresses beyond wind_stress_limit thicken first and grow less long",
+        unit="",
+    )
+
+    @model_validator(mode="after")
+    def _wind_blows(self) -> Mechanics:
+        if self.wind_growth and self.wind_m_s == 0.0:
+            raise Refusal("wind_growth needs a wind", key="wind_m_s", expected="above 0, m/s")
+        return self
 
 
 class Shadow(Table):

@@ -165,6 +165,16 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
+    def _wind_has_a_price(self) -> Scenario:
+        if self.mode == "paper" and self.mechanics is not None and self.mechanics.wind_growth:
+            raise Refusal(
+                "wind_growth shifts dry mass, and paper mode has none",
+                key="mechanics.wind_growth",
+                expected='mode = "mass_balance"',
+            )
+        return self
+
+    @model_validator(mode="after")
     def _picture_fits(self) -> Scenario:
         rendered = self.environment.rendered
         if rendered is None:

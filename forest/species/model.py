@@ -281,6 +281,13 @@ class Mechanics(Table):
     drag_coefficient: float = quantity(
         0.3, "drag of the crown per frontal area, before leaves stream with the wind", ge=0, le=2
     )
+    wind_stress_limit: float = quantity(
+        0.05,
+        "stress in the usual wind, as a share of rupture_mpa, beyond which a stem thickens first "
+        "and spends less on length (wind_growth)",
+        gt=0,
+        le=1,
+    )
     tropic_force_n: float = quantity(
         0.0,
         "force that turns a new metamer upwards (F_tropic, eq. 4); 0 = off",

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from forest.growth.budget import ACCOUNTS, EXTENSION, RESERVE_CHANGE, RING, SPEND
 from forest.growth.dealing import Workbench, deal
-from forest.growth.pipes import reinforce, thicken
+from forest.growth.pipes import NO_NEED, reinforce, thicken
 from forest.trees.metamers import LATERAL
 from tests.builders import random_arena
 from tests.growth.growing import copied, extent, make_species, make_traits, make_year
@@ -148,10 +148,10 @@ def test_a_thin_limb_is_thickened_first() -> None:
     fresh = (1.0, 1.0, 0.0)
     arguments = (m.parent[here], m.length[here], m.pipe[here], m.state[here], wood, fresh)
     thin = m.pipe[here].copy()
-    half = reinforce(*arguments, 1e-4, np.empty((4, n)))
+    half = reinforce(*arguments, NO_NEED, 1e-4, np.empty((4, n)))
     assert half == pytest.approx(1e-4)
     m.pipe[here] = thin
-    reinforce(*arguments, 1e9, np.empty((4, n)))
+    reinforce(*arguments, NO_NEED, 1e9, np.empty((4, n)))
     radius = np.sqrt(m.pipe[here]) / 2
     needed = np.array([slow.needs_to_support(w, density) for w in load])
     np.testing.assert_allclose(radius, needed, rtol=1e-5)
@@ -188,6 +188,7 @@ def test_no_limb_sags_beyond_the_limit() -> None:
         m.state[here],
         (density, 1e12, leaf_mass),  # so strong that its load asks for nothing
         (fresh_wood, fresh_leaf, sag),
+        NO_NEED,
         1e9,
         np.empty((4, int(trees.size[0]))),
     )
