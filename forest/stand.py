@@ -333,6 +333,8 @@ class Stand:
         wanted[first_row:] = 1
         self.arena.make_room(rows.start, rows.size, rows.room, wanted)
         sprout(self.arena.metamers, rows, first_row, heading, self._traits, self._year())
+        for field in self.arena.companions:
+            field[rows.start[first_row:]] = 0  # they get their rods with their first year
         measures = self.measure()
         for row in range(first_row, len(rows.tree_id)):
             self.pending.append(Event.of(self, row, "planted", "none", measures))

@@ -50,7 +50,7 @@ def test_a_heavy_axis_that_grows_upwards_is_s_shaped() -> None:
     assert len(inflections(rates)) == 1
     light = curvature(last("s_shaped_axis", "years=5"))
     assert light.mean() > 0.03  # up as a whole
-    no_tropism = curvature(last("s_shaped_axis", ".mechanics.tropic_force_n=0.0"))
+    no_tropism = curvature(last("s_shaped_axis", ".mechanics.tropic_torque_nm=0.0"))
     assert no_tropism.max() < 0.005
 
 
