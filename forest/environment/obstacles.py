@@ -88,6 +88,22 @@ def solid_at(solid: Any, ix: Any, iy: Any, iz: Any) -> Any:
     return mask[z, y, x] != 0
 
 
+@njit
+def inside(solid: Any, trees: Any, row: Any, place: Any, voxel_m: Any) -> Any:
+    """Tell whether a place, relative to the base of the tree in a row, lies inside an obstacle."""
+    if solid.mask.size == 1:
+        return False
+    x = np.float64(trees.base_offset[row, 0]) + np.float64(place[0])
+    y = np.float64(trees.base_offset[row, 1]) + np.float64(place[1])
+    z = np.float64(trees.base_offset[row, 2]) + np.float64(place[2])
+    return solid_at(
+        solid,
+        trees.base_voxel[row, 0] + np.int32(np.floor(x / voxel_m)),
+        trees.base_voxel[row, 1] + np.int32(np.floor(y / voxel_m)),
+        trees.base_voxel[row, 2] + np.int32(np.floor(z / voxel_m)),
+    )
+
+
 def no_solid() -> Solid:
     """Give the mask of a plot without obstacles."""
     return Solid(np.zeros((1, 1, 1), np.uint8), np.zeros(3, np.int32), 0, np.ones(2, np.int64))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forest._jit import driver
 from forest._threads import in_threads
+from forest.environment.obstacles import Solid, inside
 from forest.growth.dealing import BINS, Deal
 from forest.mechanics.rods import Loads
 from forest.mechanics.stems import GRAVITY, wood_radius
@@ -71,19 +72,31 @@ def _hang_chunks(first, step, arena, trees, shared, species, weight):  # type: i
 
 
 @driver
-def _ground_chunks(first, step, arena, trees, shared):  # type: ignore[no-untyped-def]
+def _bury_chunks(first, step, arena, trees, shared, solid, voxel_m):  # type: ignore[no-untyped-def]
     bare = np.uint8(255 - TERMINAL - LATERAL)
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             for i in range(trees.start[row], trees.start[row] + trees.size[row]):
-                if arena.tip[i, 2] < 0.0:
+                if arena.tip[i, 2] < 0.0 or inside(solid, trees, row, arena.tip[i], voxel_m):
                     arena.state[i] &= bare
 
 
-def bury_sites(arena: Metamers, trees: Trees, shared: Deal) -> None:
-    """Let the sites die that hang below the ground; what bears none is shed next year."""
-    in_threads(_ground_chunks, arena, trees, shared)
+def bury_sites(
+    arena: Metamers, trees: Trees, shared: Deal, solid: Solid, voxel_m: float
+) -> None:
+    """Let the sites die that hang in the ground or an obstacle; what bears none is shed next year.
+
+    Parameters
+    ----------
+    arena, trees, shared : Metamers, Trees, Deal
+        All trees, and how they are dealt to threads.
+    solid : Solid
+        Voxels that obstacles fill.
+    voxel_m : float
+        Edge of those voxels, m.
+    """
+    in_threads(_bury_chunks, arena, trees, shared, solid, voxel_m)
 
 
 def hang(arena: Metamers, trees: Trees, shared: Deal, species: LoadSpecies, loads: Loads) -> None:

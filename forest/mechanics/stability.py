@@ -21,6 +21,7 @@ from forest.mechanics.stress import (
     PROJECTION,
     Wind,
     bending_moments,
+    heavy_side,
     largest_stress,
     wind_forces,
 )
@@ -173,21 +174,22 @@ def _measure_stem(stem, tip, row, species, sp, wind, force, moment, out):  # typ
     top = stem.metamer[len(stem.metamer) - 1]
     out.critical_height_m[row] = np.float64(tip[top, 2]) * factor ** (1.0 / 3.0)
     out.frequency_hz[row] = bending_frequency(column)
-    along_x = np.cos(wind.azimuth)
-    along_y = np.sin(wind.azimuth)
     force[:] = 0.0
-    bending_moments(stem, tip, force, along_x, along_y, moment)
+    bending_moments(stem, tip, force, 1.0, 0.0, moment)
     stress, where = largest_stress(stem, moment)
     out.stress_share[row] = stress / species.rupture[sp]
     out.stress_height_m[row] = _foot(stem, tip, where)
     if wind.speed[row] > 0.0:
+        along_x, along_y = heavy_side(stem, tip, where)
         area = moment  # needed no longer
         for k in range(len(area)):
             area[k] = PROJECTION * stem.leaf_area[k]
         profile = (wind.canopy_height, wind.attenuation[row])
         wind_forces(stem.leaf_height, area, wind.speed[row], profile, species.drag[sp], force)
         bending_moments(stem, tip, force, along_x, along_y, moment)
-        stress, where = largest_stress(stem, moment)
+        pushed, there = largest_stress(stem, moment)
+        if pushed > stress:  # a wind in crowns that hang low may relieve a stem; lulls do not
+            stress, where = pushed, there
     out.wind_stress_share[row] = stress / species.rupture[sp]
     out.wind_stress_height_m[row] = _foot(stem, tip, where)
     out.base_moment_nm[row] = moment[0]
@@ -229,7 +231,7 @@ def measure_stability(first, step, arena, trees, shared, scratch, species, rigid
 
 def calm(n: int) -> Wind:
     """No wind over `n` trees."""
-    return Wind(np.zeros(n), 1.0, 0.0, np.zeros(n))
+    return Wind(np.zeros(n), 1.0, np.zeros(n))
 
 
 def stability(
@@ -248,7 +250,8 @@ def stability(
     species : StemSpecies
         One entry per species.
     wind : Wind, optional
-        Calm without it.
+        Calm without it. It blows to the side to which weight bends the stem where it is stressed
+        most; where it relieves the stem, still air counts.
     rigidity : float32 array (metamers, 3)
         Rigidities of the rods (G J, E I, E I), N m2; without them E is constant.
 

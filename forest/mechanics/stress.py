@@ -27,7 +27,7 @@ PROJECTION = 0.5
 
 
 class Wind(NamedTuple):
-    """A wind over a stand.
+    """A wind over a stand. It has no direction: it blows to each tree's heavy side (`heavy_side`).
 
     Attributes
     ----------
@@ -35,15 +35,12 @@ class Wind(NamedTuple):
         At the top of the canopy, m/s, for each row of the tree table.
     canopy_height : float
         m, more than 0.
-    azimuth : float
-        Direction towards which it blows, rad from x to y.
     attenuation : float64 (trees,)
         How fast it falls below the canopy's top around each tree; `ATTENUATION` in closed stands.
     """
 
     speed: NDArray[np.float64]
     canopy_height: float
-    azimuth: float
     attenuation: NDArray[np.float64]
 
 
@@ -93,6 +90,32 @@ def wind_forces(height, crown_area, speed, profile, drag, force):  # type: ignor
     for k in range(len(height)):
         u = speed * wind_profile(height[k], canopy_height, attenuation)
         force[k] = 0.5 * AIR_DENSITY * drag * streamlining(u) * crown_area[k] * u * u
+
+
+@njit
+def heavy_side(stem, tip, station):  # type: ignore[no-untyped-def]
+    """Unit vector to the side to which weight bends a stem at the foot of a station.
+
+    A wind to that side adds up with the weight there. +x where the weight is in balance.
+    """
+    mass = 0.0
+    x = 0.0
+    y = 0.0
+    for k in range(station, len(stem.load)):
+        i = stem.metamer[k]
+        low_x = low_y = 0.0
+        if k > 0:
+            low_x = np.float64(tip[stem.metamer[k - 1], 0])
+            low_y = np.float64(tip[stem.metamer[k - 1], 1])
+        mass += stem.wood[k] + stem.load[k]
+        x += stem.wood[k] * 0.5 * (low_x + np.float64(tip[i, 0])) + stem.load_x[k]
+        y += stem.wood[k] * 0.5 * (low_y + np.float64(tip[i, 1])) + stem.load_y[k]
+    if station > 0:
+        foot = stem.metamer[station - 1]
+        x -= mass * np.float64(tip[foot, 0])
+        y -= mass * np.float64(tip[foot, 1])
+    reach = np.sqrt(x * x + y * y)
+    return (x / reach, y / reach) if reach > 0.0 else (1.0, 0.0)
 
 
 @njit

@@ -13,21 +13,9 @@ from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import FLOATS, INTEGERS, Deal, Scratch
 from forest.mechanics.stems import NO_RIGIDITY, StemSpecies, stem_stations
-from forest.mechanics.stress import PROJECTION, Wind, bending_moments, wind_forces
+from forest.mechanics.stress import PROJECTION, Wind, bending_moments, heavy_side, wind_forces
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
-
-
-@njit
-def _heavy_side(stem):  # type: ignore[no-untyped-def]
-    """Unit vector to the side on which the crown hangs; +x where it is in balance."""
-    x = 0.0
-    y = 0.0
-    for k in range(len(stem.load)):
-        x += stem.load_x[k]
-        y += stem.load_y[k]
-    reach = np.sqrt(x * x + y * y)
-    return (x / reach, y / reach) if reach > 0.0 else (1.0, 0.0)
 
 
 @njit
@@ -36,7 +24,7 @@ def _need_of_stem(stem, tip, pipe, speed, profile, drag, limit, force, moment, n
     for k in range(len(force)):
         moment[k] = PROJECTION * stem.leaf_area[k]
     wind_forces(stem.leaf_height, moment, speed, profile, drag, force)
-    along_x, along_y = _heavy_side(stem)
+    along_x, along_y = heavy_side(stem, tip, 0)
     bending_moments(stem, tip, force, along_x, along_y, moment)
     for k in range(len(force)):
         need[stem.metamer[k]] = (32.0 * moment[k] / (np.pi * limit)) ** (2.0 / 3.0)
@@ -88,7 +76,7 @@ def feel_wind(
 ) -> None:
     """Find what the stems need in the usual wind, before they thicken.
 
-    The wind blows to the side on which the crown hangs, where it and the weight add up.
+    The wind blows to the side on which the tree hangs over its foot, where both add up.
 
     Parameters
     ----------

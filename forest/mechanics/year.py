@@ -1,4 +1,4 @@
-"""A year of mechanics: trees bend under their load, and rings set in the shape they have then.
+"""A year of mechanics: rings set in the shape of last summer, then trees bend under their load.
 
 One object per stand, with the species' wood and the scratch memory that is kept from year to year.
 What a metamer must remember is in the arena's companions (`forest.mechanics.rods.Rods`).
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.environment.obstacles import Solid
 from forest.growth.dealing import Deal, Workbench, deal
 from forest.mechanics.branch_points import reaction_rings
 from forest.mechanics.equilibrium import Bench, Settled, settle
@@ -96,11 +97,25 @@ class Mechanics:
         """What the arena must keep of each metamer."""
         return allocate_rods if self._spec.bending else None
 
-    def bend(self, arena: Arena, trees: Trees, step: int) -> None:
-        """Bend all trees under summer's load, and lay this year's rings in the shape they take.
+    def bend(
+        self, arena: Arena, trees: Trees, step: int, solid: Solid, voxel_m: float
+    ) -> None:
+        """Lay this year's rings in the shape of last summer, then bend all trees under their load.
 
-        Taylor-Hell 2005, sections 4 to 6; without bending the rings follow from the statics of
-        branch points (Hart & Baker 2003, 5.1).
+        Reaction wood therefore answers last summer's lean, with a lag of one year. Sites that come
+        to lie in the ground or in an obstacle die. Taylor-Hell 2005, sections 4 to 6; without
+        bending the rings follow from the statics of branch points (Hart & Baker 2003, 5.1).
+
+        Parameters
+        ----------
+        arena, trees : Arena, Trees
+            All trees, with this year's shoots and thickness.
+        step : int
+            Years grown so far.
+        solid : Solid
+            Near-field voxels that obstacles fill.
+        voxel_m : float
+            Edge of those voxels, m.
         """
         metamers = arena.metamers
         if not self._spec.bending:
@@ -115,7 +130,7 @@ class Mechanics:
         righting = _RIGHTING[self._spec.righting]
         lay_wood(metamers, trees, shared, rods, self._woods, righting, self.ring)
         self.settle(arena, trees)
-        bury_sites(metamers, trees, shared)
+        bury_sites(metamers, trees, shared, solid, voxel_m)
 
     def settle(self, arena: Arena, trees: Trees) -> None:
         """Bring all trees to rest under summer's load."""
@@ -212,7 +227,7 @@ class Mechanics:
         tall = seen.height[seen.height > 0.0]
         canopy_height = float(np.quantile(tall, _CANOPY_TOP)) if len(tall) else 0.0
         share, attenuation = sheltered(upwind_depth(trees.x, trees.y, seen, self._plot))
-        return Wind(self._spec.wind_m_s * share, max(canopy_height, 0.1), 0.0, attenuation)
+        return Wind(self._spec.wind_m_s * share, max(canopy_height, 0.1), attenuation)
 
 
 def _tropism(species: Sequence[Species]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

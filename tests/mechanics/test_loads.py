@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from forest._threads import using_threads
+from forest.environment.obstacles import Box, voxelise
 from forest.growth.dealing import deal
 from forest.mechanics.loads import LoadSpecies, bury_sites, hang, make_loads
 from forest.species import Species, shipped_table
@@ -67,18 +68,22 @@ def test_winter_takes_fruit_and_short_lived_leaves() -> None:
 
 @given(seeds)
 @settings(max_examples=25, deadline=None)
-def test_sites_below_the_ground_die(seed: int) -> None:
+def test_sites_in_the_ground_and_in_obstacles_die(seed: int) -> None:
     rng = np.random.default_rng(seed)
     m, trees = random_arena(rng, 3, 20)
     m.tip[:, 2] -= np.float32(rng.uniform(0.0, 0.5))
     before = m.state.copy()
-    bury_sites(m, trees, deal(trees.size))
+    low, size = rng.integers(0, 8, 3), rng.integers(1, 8, 3)
+    box = Box(tuple(0.25 * low), tuple(0.25 * (low + size)))
+    solid = voxelise([box], (16, 16), periodic=False, voxel_m=0.25)
+    bury_sites(m, trees, deal(trees.size), solid, 0.25)
     sites = np.uint8(TERMINAL | LATERAL)
     untouched = np.ones(len(m.state), np.bool_)
     for row in range(3):
         nodes = read_plant(m, trees, row)
         here = trees.start[row] + np.arange(len(nodes))
-        below = np.array(slow.buried(nodes))
+        base = 0.25 * trees.base_voxel[row] + trees.base_offset[row]
+        below = np.array(slow.buried(nodes, base, [box]))
         untouched[here] = ~below
         assert not np.any(m.state[here[below]] & sites)
         np.testing.assert_array_equal(m.state[here] | sites, before[here] | sites)

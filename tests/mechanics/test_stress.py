@@ -13,6 +13,7 @@ from forest.mechanics.stress import (
     ATTENUATION,
     Wind,
     bending_moments,
+    heavy_side,
     largest_stress,
     streamlining,
     wind_forces,
@@ -126,19 +127,54 @@ def test_wind_forces(seed: int) -> None:
 
 
 def test_wind_bends_trees() -> None:
-    """More wind, more stress; from another side a leaning tree is bent otherwise."""
+    """The wind's moment adds to that of the weight."""
     m, trees = pole(tapered(40, 1.0, 0.1), 12.0, lean=0.1)
     m.state[20:40] |= TERMINAL
     closed = np.array([ATTENUATION])
     calm = stability(m, trees, SPECIES)
-    with_lean = stability(m, trees, SPECIES, Wind(np.array([12.0]), 12.0, 0.0, closed))
-    against = stability(m, trees, SPECIES, Wind(np.array([12.0]), 12.0, np.pi, closed))
-    np.testing.assert_array_equal(with_lean.stress_share, calm.stress_share)
+    windy = stability(m, trees, SPECIES, Wind(np.array([12.0]), 12.0, closed))
+    np.testing.assert_array_equal(windy.stress_share, calm.stress_share)
     np.testing.assert_array_equal(calm.wind_stress_share, calm.stress_share)
-    assert with_lean.wind_stress_share[0] > calm.stress_share[0]
-    assert with_lean.base_moment_nm[0] > against.base_moment_nm[0]
+    assert windy.wind_stress_share[0] > calm.stress_share[0]
     stem = read_stem(m, trees, 0, SPECIES)
     force = np.empty(40)
     wind_forces(stem.leaf_height, 0.5 * stem.leaf_area, 12.0, (12.0, ATTENUATION), 0.35, force)
     pushed = calm.base_moment_nm[0] + force @ stem.leaf_height
-    assert with_lean.base_moment_nm[0] == pytest.approx(pushed, rel=1e-5)
+    assert windy.base_moment_nm[0] == pytest.approx(pushed, rel=1e-5)
+
+
+@given(seeds)
+@settings(max_examples=25, deadline=None)
+def test_heavy_side(seed: int) -> None:
+    m, trees = woody_arena(np.random.default_rng(seed), 1, 30)
+    of, nodes = wood_of(trees.species[0]), read_plant(m, trees, 0)
+    stem = read_stem(m, trees, 0, SPECIES)
+    tip = _tips(m, int(trees.start[0]), int(trees.size[0]))
+    for k in range(len(stem.metamer)):
+        wanted = slow.heavy_side(nodes, k, of)[:2]
+        np.testing.assert_allclose(heavy_side(stem, tip, k), wanted, atol=1e-3)
+
+
+@pytest.mark.parametrize("leafy", [True, False])
+@pytest.mark.parametrize("turn", [0.5 * np.pi, np.pi, 4.0])
+def test_wind_has_no_side_of_its_own(turn: float, leafy: bool) -> None:
+    """A tree that leans elsewhere is stressed the same, whether or not its leaves catch wind."""
+    wind = Wind(np.array([12.0]), 12.0, np.array([ATTENUATION]))
+    m, trees = pole(tapered(40, 1.0, 0.1), 12.0, lean=0.1)
+    if leafy:
+        m.state[20:40] |= TERMINAL
+    one = stability(m, trees, SPECIES, wind)
+    x = m.tip[:, 0].astype(np.float64)
+    m.tip[:, 0], m.tip[:, 1] = np.cos(turn) * x, np.sin(turn) * x
+    other = stability(m, trees, SPECIES, wind)
+    np.testing.assert_allclose(one.wind_stress_share, other.wind_stress_share, rtol=1e-5)
+    np.testing.assert_allclose(one.base_moment_nm, other.base_moment_nm, rtol=1e-5)
+    assert (one.wind_stress_share[0] > one.stress_share[0]) == leafy
+
+
+@given(seeds, st.floats(0.1, 40.0), st.floats(0.0, 3.0))
+@settings(max_examples=25, deadline=None)
+def test_wind_never_lowers_the_stress(seed: int, speed: float, fall: float) -> None:
+    m, trees = woody_arena(np.random.default_rng(seed), 3, 30)
+    out = stability(m, trees, SPECIES, Wind(np.full(3, speed), 2.0, np.full(3, fall)))
+    assert np.all(out.wind_stress_share >= out.stress_share)

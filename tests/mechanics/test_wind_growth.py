@@ -29,7 +29,7 @@ def test_needs_against_the_twin(seed: int) -> None:
     species = SPECIES._replace(pipe_exponent=np.array([2.0, 2.0]))  # as mass balance has it
     shared = deal(trees.size)
     limit = np.array([2e6, 3e6])
-    wind = Wind(rng.uniform(0.0, 20.0, 3), rng.uniform(1.0, 4.0), 0.0, rng.uniform(0.0, 2.0, 3))
+    wind = Wind(rng.uniform(0.0, 20.0, 3), rng.uniform(1.0, 4.0), rng.uniform(0.0, 2.0, 3))
     need = np.full(len(m.pipe), 9.0, np.float32)
     feel_wind(m, trees, shared, Workbench().scratch(shared), species, limit, wind, need)
     for row in range(3):

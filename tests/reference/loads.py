@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from forest.environment.obstacles import Box
 from forest.species import Species
 from tests.reference.plant import Node
 
@@ -29,6 +32,11 @@ def site_weight(node: Node, species: Species, *, winter: bool) -> float:
     return GRAVITY * mass * node.buds
 
 
-def buried(nodes: Sequence[Node]) -> list[bool]:
-    """Tell which nodes lie below the ground."""
-    return [bool(node.tip[2] < 0.0) for node in nodes]
+def buried(nodes: Sequence[Node], base: np.ndarray, boxes: Sequence[Box]) -> list[bool]:
+    """Tell which nodes lie below the ground or in a box; `base` is the place of the tree, m."""
+
+    def dead(x: np.ndarray) -> bool:
+        held = [np.all((x + base > b.min_m) & (x + base < b.max_m)) for b in boxes]
+        return bool(x[2] < 0.0 or any(held))
+
+    return [dead(node.tip) for node in nodes]

@@ -132,6 +132,16 @@ def _largest(load: np.ndarray, stiffness: np.ndarray) -> float:
     return float(eigh(load * scale, stiffness * scale, eigvals_only=True)[-1])
 
 
+def heavy_side(nodes: Sequence[Node], k: int, of: Wood) -> np.ndarray:
+    """Horizontal unit vector from the foot of station k to the centre of all masses above it."""
+    stem = stem_of(nodes)
+    carried = [*stem[k:], *(n for j in range(k, len(stem)) for n in hanging(stem, j))]
+    hangs = sum((m * (x - stem[k].start) for m, x in masses(carried, of)), np.zeros(3))
+    hangs[2] = 0.0
+    size = np.linalg.norm(hangs)
+    return hangs / size if size > 0.0 else np.array([1.0, 0.0, 0.0])
+
+
 def moment(
     nodes: Sequence[Node], k: int, of: Wood, forces: Sequence[float], blows: np.ndarray
 ) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from forest.mechanics.shelter import PARTITION, REACH, Plot
 from tests.reference.plant import Node
-from tests.reference.stems import Wood, leaf_area, moment, stem_of
+from tests.reference.stems import Wood, heavy_side, leaf_area, moment, stem_of
 
 
 def upwind_depth(
@@ -71,13 +71,7 @@ def need_of_stem(
             u = speed * math.log((height / canopy - 2 / 3) / 0.1) / math.log(10 / 3)
         crown = 0.5 * area * (10.0 / min(max(u, 11.0), 20.0) - 0.1)
         forces.append(0.5 * 1.25 * drag * crown * u**2)
-    hangs = np.zeros(3)
-    for node in nodes:
-        hangs += of.leaves(node) * node.tip
-        if node not in stem:
-            hangs += of.wood(node) * 0.5 * (node.start + node.tip)
-    hangs[2] = 0.0
-    blows = hangs / np.linalg.norm(hangs) if hangs.any() else np.array([1.0, 0.0, 0.0])
+    blows = heavy_side(nodes, 0, of)
     need = {}
     for k, node in enumerate(stem):
         cube = 32.0 * moment(nodes, k, of, forces, blows) / (math.pi * limit)
