@@ -17,9 +17,6 @@ from forest._jit import njit
 from forest.growth.bud_fate import lit_buds
 from forest.trees.metamers import LATERAL, MAIN, NO_ROOM_TERMINAL, TERMINAL
 
-#: k of supports(R, d) = k d R^2 from the 300-foot limit (eq. 8), m.
-SUPPORT = np.pi * 30.48
-
 
 class Wood(NamedTuple):
     """What a limb is made of.

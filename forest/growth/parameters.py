@@ -123,6 +123,32 @@ class Year(NamedTuple):
     balance: bool = False
 
 
+def support(species: Sequence[Species], density: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give k of supports(R, d) = k d R^2 (Hart & Baker 2003, 3.4, eqs 6 to 8), m.
+
+    From the height limit h of a cone, k = pi h / 3, whatever the density; or, where a species gives
+    its crushing strength sigma, k = pi sigma / (g d), so that pi R^2 sigma / g is supported.
+
+    Parameters
+    ----------
+    species : sequence of Species
+    density : float64 (species,)
+        The d with which k will be used, kg/m3.
+
+    Returns
+    -------
+    float64 (species,)
+    """
+    k = np.empty(len(species))
+    for i, s in enumerate(species):
+        strength = s.balance.crushing_strength_mpa
+        if strength is None:
+            k[i] = np.pi / 3.0 * s.balance.height_limit_m
+        else:
+            k[i] = np.pi * 1e6 * strength / (_GRAVITY * density[i])
+    return k
+
+
 def species_traits(
     species: Sequence[Species], *, paper: bool, bending: bool = False
 ) -> SpeciesTraits:
@@ -199,7 +225,7 @@ def species_traits(
         "suppression_years": each("carbon", "suppression_years"),
         "deficit_years": each("carbon", "deficit_years"),
         "abortion": each("carbon", "abortion_probability"),
-        "support": each("balance", "height_limit_m", np.pi / 3.0),
+        "support": support(species, each("wood", "density_kg_m3")),
         "thickening": each("balance", "thickening_m_kg_m2"),
         "min_growth": each("balance", "min_growth"),
         "offset_gain": each("balance", "offset_gain"),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from forest import random
 from forest._jit import driver, njit
 from forest._threads import in_threads
-from forest.environment.obstacles import Solid, solid_at
+from forest.environment.obstacles import Solid, inside
 from forest.growth.curves import curve
 from forest.growth.dealing import BINS, Deal
 from forest.growth.parameters import (
@@ -138,15 +138,8 @@ def _blocked(solid, trees, row, x0, y0, z0, x1, y1, z1, voxel_m):  # type: ignor
     steps = max(np.int64(np.ceil(2.0 * length / voxel_m)), 1)
     for k in range(1, steps + 1):
         part = k / steps
-        x = trees.base_offset[row, 0] + x0 + part * (x1 - x0)
-        y = trees.base_offset[row, 1] + y0 + part * (y1 - y0)
-        z = trees.base_offset[row, 2] + z0 + part * (z1 - z0)
-        if solid_at(
-            solid,
-            trees.base_voxel[row, 0] + np.int32(np.floor(x / voxel_m)),
-            trees.base_voxel[row, 1] + np.int32(np.floor(y / voxel_m)),
-            trees.base_voxel[row, 2] + np.int32(np.floor(z / voxel_m)),
-        ):
+        place = (x0 + part * (x1 - x0), y0 + part * (y1 - y0), z0 + part * (z1 - z0))
+        if inside(solid, trees, row, place, voxel_m):
             return True
     return False
 

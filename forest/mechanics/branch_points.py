@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import FLOATS, INTEGERS, Workbench, deal
-from forest.growth.limbs import SUPPORT
 from forest.mechanics.stems import StemSpecies, wood_radius
 from forest.trees.metamers import LATERAL, MAIN, TERMINAL, Metamers
 from forest.trees.table import Trees
@@ -124,8 +123,10 @@ def weigh_limbs(arena, trees, row, species, work, tips):  # type: ignore[no-unty
 
 
 @njit
-def _brace(work, tip, i, p, end, radius, density):  # type: ignore[no-untyped-def]
+def _brace(work, tip, i, p, end, radius, strength):  # type: ignore[no-untyped-def]
     """Give delta and Delta r of the limb from metamer `i` on parent `p` to metamer `end`.
+
+    `strength` is the mass that the limb's base supports per square of its radius, kg/m2.
 
     A limb's direction is that from its base to its tip. The trunk's is the direction from its
     base to the tree's centre of mass: an upright trunk under a crown that leans needs wood too.
@@ -149,7 +150,7 @@ def _brace(work, tip, i, p, end, radius, density):  # type: ignore[no-untyped-de
     span = np.sqrt(flat**2 + along_z**2)
     lean = flat / span if span > 0.0 else 0.0
     arm = (centre_x * along_x + centre_y * along_y) / flat if flat > 0.0 else 0.0
-    supports = SUPPORT * density * radius * radius
+    supports = strength * radius * radius
     return support_offset(mass, arm, supports, lean, work[4, i]), widening(radius, lean)
 
 
@@ -160,6 +161,7 @@ def _shape_rings(arena, trees, row, species, work, tips, rings):  # type: ignore
     sp = trees.species[row]
     tip = arena.tip[s : s + np.int64(trees.size[row])]
     turned = 0.0 if species.compression_wood[sp] > 0.0 else np.pi
+    strength = species.support[sp] * species.green_density[sp]
     reach, widened, along = work[5], work[6], work[7]
     mass = work[0, 0]
     centre_x = work[1, 0] / mass
@@ -174,8 +176,7 @@ def _shape_rings(arena, trees, row, species, work, tips, rings):  # type: ignore
             along[i] = along[p] + length
         else:
             r = wood_radius(arena.pipe[s + i], species.pipe_exponent[sp])
-            density = species.green_density[sp]
-            reach[i], widened[i] = _brace(work, tip, i, p, tips[i], r, density)
+            reach[i], widened[i] = _brace(work, tip, i, p, tips[i], r, strength)
             along[i] = length
         rings[s + i, 0] = 0.0
         rings[s + i, 1] = 0.0

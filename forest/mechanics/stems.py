@@ -26,6 +26,7 @@ class StemSpecies(NamedTuple):
 
     pipe_exponent: NDArray[np.float64]  # n of the pipe model
     green_density: NDArray[np.float64]  # fresh mass of wood per fresh volume, kg/m3
+    support: NDArray[np.float64]  # k of supports(R, d) = k d R^2 with the green density, m
     leaf_mass: NDArray[np.float64]  # fresh mass of a site's leaves, kg
     leaf_area: NDArray[np.float64]  # of a site, m2
     modulus: NDArray[np.float64]  # of elasticity, green wood, Pa

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from forest.environment.obstacles import Solid
 from forest.growth.dealing import Deal, Workbench, deal
+from forest.growth.parameters import support
 from forest.mechanics.branch_points import reaction_rings
 from forest.mechanics.equilibrium import Bench, Settled, settle
 from forest.mechanics.loads import LoadSpecies, bury_sites, hang, make_loads
@@ -251,6 +252,7 @@ def _stem_species(species: Sequence[Species], pipe_exponent: NDArray[np.float64]
     return StemSpecies(
         pipe_exponent=pipe_exponent,
         green_density=each("green_density_kg_m3"),
+        support=support(species, each("green_density_kg_m3")),
         leaf_mass=np.array(leaves) * each("leaf_water_factor"),
         leaf_area=np.array([s.leaves.area_m2 for s in species]),
         modulus=each("modulus_mature_gpa", 1e9),

@@ -228,6 +228,14 @@ class Balance(Table):
         ge=1,
         le=10000,
     )
+    crushing_strength_mpa: float | None = quantity(
+        None,
+        "stress at which green wood is crushed along the grain; where given, support follows from "
+        "it in place of height_limit_m",
+        unit="MPa",
+        gt=0,
+        le=200,
+    )
     thickening_m_kg_m2: float = quantity(
         0.0003,
         "radius that the trunk gains in a year per lit leaf area and mass of the tree, in paper "

@@ -15,7 +15,9 @@ from forest.growth.balance import (
     survey,
     trunk_growth,
 )
-from forest.growth.limbs import SUPPORT, Limbs, Tree, Wood, cone_centre, cone_volume, supports
+from forest.growth.limbs import Limbs, Tree, Wood, cone_centre, cone_volume, supports
+from forest.growth.parameters import species_traits, support
+from forest.species import Species
 from forest.trees.metamers import LATERAL, NO_ROOM_LATERAL, NO_ROOM_TERMINAL, TERMINAL
 from tests.builders import random_arena
 from tests.growth.growing import extent
@@ -94,8 +96,20 @@ def test_cone(base: float, part: float) -> None:
 
 def test_height_limit() -> None:
     """A cone of 300 feet carries itself exactly (eq. 8)."""
-    wood = Wood(500.0, SUPPORT, 2.0, 0.0, True)
+    k = support([Species(name="a")], np.array([500.0]))[0]
+    wood = Wood(500.0, k, 2.0, 0.0, True)
     assert supports(0.5, wood) == pytest.approx(500.0 * cone_volume(91.44, 0.5, 0.0))
+
+
+def test_crushing_strength() -> None:
+    """Where wood has a strength, a base carries what crushes it, whatever its density (3.4)."""
+    weak, strong = (Species(name="a", balance={"crushing_strength_mpa": s}) for s in (2.0, 20.0))
+    k = support([weak, strong, strong], np.array([400.0, 400.0, 900.0]))
+    of = [Wood(d, kd, 2.0, 0.0, True) for d, kd in zip((400.0, 400.0, 900.0), k, strict=True)]
+    crushed = np.pi * 0.1**2 * np.array([2e6, 20e6, 20e6]) / 9.80665
+    np.testing.assert_allclose([supports(0.1, wood) for wood in of], crushed)
+    traits = species_traits([weak], paper=False).of["support"]
+    assert traits[0] * weak.wood.density_kg_m3 == pytest.approx(k[0] * 400.0)
 
 
 @given(seeds, st.sampled_from([1.0, 20.0, 500.0]), st.sampled_from([2.0, 2.5, 3.0]), st.booleans())

@@ -15,6 +15,7 @@ from tests.reference.stems import Wood
 SPECIES = StemSpecies(
     pipe_exponent=np.array([2.0, 2.5]),
     green_density=np.array([850.0, 1000.0]),
+    support=np.array([95.0, 40.0]),
     leaf_mass=np.array([0.01, 0.02]),
     leaf_area=np.array([0.05, 0.03]),
     modulus=np.array([6.3e9, 9.8e9]),
@@ -29,6 +30,7 @@ def wood_of(species: int) -> Wood:
     return Wood(
         exponent=float(SPECIES.pipe_exponent[species]),
         density=float(SPECIES.green_density[species]),
+        support=float(SPECIES.support[species]),
         leaf_mass=float(SPECIES.leaf_mass[species]),
         leaf_area=float(SPECIES.leaf_area[species]),
         modulus=float(SPECIES.modulus[species]),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -37,7 +39,7 @@ def test_needs_against_the_twin(seed: int) -> None:
         of = wood_of(sp)
         wanted, stress = slow.need_of_stem(
             read_plant(m, trees, row),
-            type(of)(2.0, of.density, of.leaf_mass, of.leaf_area, of.modulus),
+            replace(of, exponent=2.0),
             float(SPECIES.drag[sp]),
             limit[sp],
             (wind.speed[row], wind.canopy_height, wind.attenuation[row]),

@@ -24,6 +24,7 @@ class Wood:
 
     exponent: float
     density: float
+    support: float
     leaf_mass: float
     leaf_area: float
     modulus: float
@@ -171,7 +172,7 @@ def reaction(base: Node, node: Node, of: Wood, conifer: bool) -> tuple[float, fl
     length = sum(n.length for n in limb)
     sin_d = math.hypot(line[0], line[1]) / np.linalg.norm(line)
     arm = (centre[:2] @ line[:2]) / np.linalg.norm(line[:2])  # X sin(theta_X)
-    force = G * math.pi * 30.48 * of.density * of.radius(base) ** 2  # eq. 8
+    force = G * of.support * of.density * of.radius(base) ** 2  # eq. 6
     delta = min(max(mass * G * arm / (force * sin_d), 0.0), length)  # eq. 25
     # supports(R + dr) - supports(R) = F_R / (g cos(theta_R)), solved for dr.
     wide = math.sqrt(of.radius(base) ** 2 * (1.0 + 1.0 / sin_d)) - of.radius(base)
