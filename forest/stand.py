@@ -216,9 +216,7 @@ class Stand:
     def _bend(self) -> None:
         if self.mechanics is not None:
             around = self.surroundings
-            self.mechanics.bend(
-                self.arena, self.rows, self.steps, around.solid, around.voxel_m
-            )
+            self.mechanics.bend(self.arena, self.rows, self.steps, around.solid, around.voxel_m)
             self._lap("bend")
 
     def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:

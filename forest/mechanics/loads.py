@@ -82,9 +82,7 @@ def _bury_chunks(first, step, arena, trees, shared, solid, voxel_m):  # type: ig
                     arena.state[i] &= bare
 
 
-def bury_sites(
-    arena: Metamers, trees: Trees, shared: Deal, solid: Solid, voxel_m: float
-) -> None:
+def bury_sites(arena: Metamers, trees: Trees, shared: Deal, solid: Solid, voxel_m: float) -> None:
     """Let the sites die that hang in the ground or an obstacle; what bears none is shed next year.
 
     Parameters

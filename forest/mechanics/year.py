@@ -98,9 +98,7 @@ class Mechanics:
         """What the arena must keep of each metamer."""
         return allocate_rods if self._spec.bending else None
 
-    def bend(
-        self, arena: Arena, trees: Trees, step: int, solid: Solid, voxel_m: float
-    ) -> None:
+    def bend(self, arena: Arena, trees: Trees, step: int, solid: Solid, voxel_m: float) -> None:
         """Lay this year's rings in the shape of last summer, then bend all trees under their load.
 
         Reaction wood therefore answers last summer's lean, with a lag of one year. Sites that come

@@ -79,6 +79,5 @@ def test_edge_trees_that_bend_are_thick_and_short() -> None:
         compare(grow(scenario("pinus_sylvestris", years=14, wind_growth=wind).with_overrides(bend)))
         for wind in (True, False)
     )
-    print(found, plain)
     assert found.slenderness["edge"] < 0.95 * plain.slenderness["edge"]
     assert found.slenderness["edge"] < found.slenderness["inside"]
