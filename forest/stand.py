@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest import management
-from forest.dynamics.planting import check_planting, seedlings
+from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
@@ -73,7 +73,7 @@ class Stand:
     def __init__(self, scenario: Scenario) -> None:
         self._start(scenario)
         x, y, species = scenario.planting_positions()
-        self._plant(x, y, species)
+        self._plant(x, y, species, headings(*scenario.planting_leans()))
         management.check_due(self)  # what cannot be done in the first year is refused before it
 
     def _start(self, scenario: Scenario) -> None:
@@ -164,7 +164,7 @@ class Stand:
             shared,
             self._bench.scratch(shared),
             self._traits,
-            not self._paper,
+            not self._paper or bool(self.arena.companions),  # it may have bent below the ground
         )
         self._lap("shed")
 
@@ -270,7 +270,13 @@ class Stand:
     # ------------------------------------------------------------------ acts between years
 
     def plant(
-        self, x: Sequence[float], y: Sequence[float], species: str | Sequence[str]
+        self,
+        x: Sequence[float],
+        y: Sequence[float],
+        species: str | Sequence[str],
+        *,
+        lean_deg: float | Sequence[float] = 0.0,
+        lean_azimuth_deg: float | Sequence[float] = 0.0,
     ) -> list[int]:
         """Plant seedlings; they start to grow with the next step.
 
@@ -280,6 +286,9 @@ class Stand:
             Places, m, inside the plot.
         species : str or sequence of str
             Name or names of species of the scenario.
+        lean_deg, lean_azimuth_deg : float or sequence of float
+            Angle of the stems to the vertical, 0 to 85, and the direction towards which they lean,
+            from x to y.
 
         Returns
         -------
@@ -290,13 +299,21 @@ class Stand:
         at = np.asarray(x, np.float64), np.asarray(y, np.float64)
         width, depth = self.scenario.plot.size_m
         check_planting(*at, names, (width, depth), self.species_names)
+        leans = check_leans(len(x), lean_deg, lean_azimuth_deg)
         if self.scenario.plot.boundary == "periodic":
             at = at[0] % width, at[1] % depth
         first = self.next_id
-        self._plant(*at, np.array([self.species_names.index(name) for name in names], np.int16))
+        codes = np.array([self.species_names.index(name) for name in names], np.int16)
+        self._plant(*at, codes, headings(*leans))
         return list(range(first, self.next_id))
 
-    def _plant(self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]) -> None:
+    def _plant(
+        self,
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        species: NDArray[Any],
+        heading: NDArray[np.float64],
+    ) -> None:
         more = seedlings(
             x,
             y,
@@ -315,7 +332,9 @@ class Stand:
         wanted = rows.size.astype(np.int64)
         wanted[first_row:] = 1
         self.arena.make_room(rows.start, rows.size, rows.room, wanted)
-        sprout(self.arena.metamers, rows, first_row, self._traits, self._year())
+        sprout(self.arena.metamers, rows, first_row, heading, self._traits, self._year())
+        for field in self.arena.companions:
+            field[rows.start[first_row:]] = 0  # they get their rods with their first year
         measures = self.measure()
         for row in range(first_row, len(rows.tree_id)):
             self.pending.append(Event.of(self, row, "planted", "none", measures))

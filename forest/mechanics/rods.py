@@ -71,8 +71,8 @@ class Loads(NamedTuple):
 
 
 def allocate_rods(capacity: int) -> Rods:
-    """Make rods for `capacity` metamers; memory is touched only when it is used."""
-    return Rods(*(np.empty((capacity, k) if k > 1 else capacity, t) for t, k, _ in FIELDS.values()))
+    """Make rods of zeros for `capacity` metamers; memory is touched only when it is used."""
+    return Rods(*(np.zeros((capacity, k) if k > 1 else capacity, t) for t, k, _ in FIELDS.values()))
 
 
 @njit

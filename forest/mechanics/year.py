@@ -222,7 +222,7 @@ def _tropism(species: Sequence[Species]) -> tuple[NDArray[np.float64], NDArray[n
     for k, s in enumerate(species):
         modulus = 1e9 * s.mechanics.modulus_juvenile_gpa
         area_moment = np.pi / 64.0 * s.wood.twig_diameter_m**4
-        tropism[k, 2] = s.mechanics.tropic_force_n * s.architecture.internode_length_m
+        tropism[k, 2] = s.mechanics.tropic_torque_nm
         stiffness[k] = modulus * area_moment
         stiffness[k, 0] *= 2.0 * s.mechanics.shear_ratio
     return tropism, stiffness

@@ -272,6 +272,12 @@ class PlantedTree(Table):
     species: str = quantity(
         "", "a species of the scenario; may be left out where there is one", unit=""
     )
+    lean_deg: float = quantity(
+        0.0, "angle between the seedling's stem and the vertical", unit="degree", ge=0, le=85
+    )
+    lean_azimuth_deg: float = quantity(
+        0.0, "direction towards which it leans, from x to y", unit="degree", ge=-360, le=360
+    )
 
 
 class Explicit(Table):

@@ -338,6 +338,22 @@ class Scenario(Table):
         shares = [use.share for use in self.species.values()]
         return x, y, placing.draw_species(shares, len(x), self.seed)
 
+    def planting_leans(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Tell how the trees of the first year lean when they are planted.
+
+        Returns
+        -------
+        lean_deg, azimuth_deg : float64 arrays
+            Angle to the vertical, and direction from x to y; one per tree of
+            `planting_positions`. Only trees that are planted one by one lean.
+        """
+        if isinstance(self.planting, Explicit):
+            trees = self.planting.trees
+            lean = np.array([tree.lean_deg for tree in trees])
+            return lean, np.array([tree.lean_azimuth_deg for tree in trees])
+        upright = np.zeros(self._count_trees())
+        return upright, upright
+
     def with_overrides(self, overrides: Iterable[str]) -> Scenario:
         """Change keys and check the whole again, files included.
 

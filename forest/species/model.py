@@ -288,11 +288,12 @@ class Mechanics(Table):
         gt=0,
         le=1,
     )
-    tropic_force_n: float = quantity(
+    tropic_torque_nm: float = quantity(
         0.0,
-        "force that turns a new metamer upwards (F_tropic, eq. 4); 0 = off",
-        unit="N",
-        ge=0,
+        "torque that turns a level new metamer upwards, below 0 downwards (F_tropic with the unit "
+        "heading, Taylor-Hell 2005, eqs 4 and 6); 0 = off",
+        unit="N m",
+        ge=-100,
         le=100,
     )
     stem_angle_deg: float = quantity(
