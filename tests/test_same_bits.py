@@ -32,6 +32,7 @@ ENVIRONMENTS = {
 }
 MECHANICS = {
     "bending": ["mechanics={wind_m_s=15}"],
+    "bending, growth in the wind": ["mechanics={wind_m_s=15, wind_growth=true}"],
     "bending, printed righting": ["mechanics={righting='beta'}"],
     "stiff": ["mechanics={bending=false}"],
 }

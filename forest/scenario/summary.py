@@ -52,7 +52,8 @@ def _mechanics(scenario: Scenario) -> str:
     if mechanics is None:
         return "none"
     how = f"bending, righting {mechanics.righting}" if mechanics.bending else "stability alone"
-    return f"{how}, wind {mechanics.wind_m_s:g} m/s"
+    answered = ", answered by growth" if mechanics.wind_growth else ""
+    return f"{how}, wind {mechanics.wind_m_s:g} m/s{answered}"
 
 
 def _acts(scenario: Scenario) -> str:
