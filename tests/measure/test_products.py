@@ -62,7 +62,7 @@ def test_a_list_is_read(tmp_path: Path, name: str, text: str):
         ("p.toml", "[[products]]", "[[product]]", "unknown key 'product'"),
         ("p.toml", "over_bark = true", "over_bark = 1", "over_bark is 1"),
         ("p.toml", "[4.0", "[4.0,,", "not TOML"),
-        ("p.csv", "sawlog,4.0", "sawlog", "line 2 has another number of columns"),
+        ("p.csv", "sawlog,4.0", "sawlog", "line 2: has another number of columns"),
         ("p.csv", "yes", "perhaps", "line 3: over_bark is 'perhaps'; expected true or false"),
         ("p.csv", "sawlog", "", "line 2: no name"),
         ("p.csv", "90", "ninety", "price_m3 is 'ninety'"),
