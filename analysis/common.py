@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 import forest
 from forest.record.run import Run
 
-#: Of seeds and shares among the young: what needs light is passed by what bears shade.
+#: Who comes first in succession, and who passes them in the end.
 LIGHT_DEMANDING = ("betula_pendula", "pinus_sylvestris")
 SHADE_TOLERANT = ("fagus_sylvatica", "picea_abies")
 
@@ -41,7 +41,7 @@ class Study:
 def script(
     document: str | None, study: Callable[[Run], Study], words: Sequence[str] | None
 ) -> None:
-    """Be `python analysis/x.py run.h5 --to figure.png`: draw a study's figure, print its numbers."""
+    """Answer `python analysis/x.py run.h5 --to figure.png`: draw the figure, print the numbers."""
     lines = (document or "").strip().splitlines()
     parser = argparse.ArgumentParser(description=lines[0])
     parser.add_argument("run", type=Path, help="run file")

@@ -127,15 +127,15 @@ def study(run: Run) -> Study:
     start = onset(stand)
     axes.loglog(stand["qmd_cm"], stand["n_ha"], "k", lw=1.6, label="stand")
     axes.plot(*stand.loc[start, ["qmd_cm", "n_ha"]], "ko", ms=5, label=f"onset, age {start}")
-    across = np.array([stand["qmd_cm"].min(), stand["qmd_cm"].max()])
+    thickest = float(stand["qmd_cm"].max())
+    across = np.array([0.2 * thickest, thickest])
     for index in (250, 500, 1000):
         line = index * (across / 25.4) ** -1.605
         axes.plot(across, line, color="0.7", lw=0.8, ls=":", zorder=0)
         axes.annotate(f" SDI {index}", (across[1], line[1]), color="0.5", fontsize=8, va="center")
     numbers = stand["n_ha"]
-    axes.set(
-        xlabel="Dq, cm", ylabel="trees per ha", ylim=(0.7 * numbers.min(), 1.5 * numbers.max())
-    )
+    axes.set(xlabel="Dq, cm", ylabel="trees per ha", xlim=(across[0], 1.1 * thickest))
+    axes.set(ylim=(0.7 * numbers.min(), 1.5 * numbers.max()))
     axes.legend(frameon=False, fontsize=8)
     last = stand.iloc[-1]
     row = {"age": start, "slope": thinning_slope(stand) if len(stand.loc[start:]) > 1 else np.nan}
