@@ -219,7 +219,7 @@ def test_periods_hold_the_trees_that_lived_through_them(dense_run: Run):
 
 
 def test_drawn_stems_of_stand_grown_trees_are_near_the_true_ones(dense_run: Run):
-    """The diameter at half the height within a fifth, volume to a hundredth."""
+    """The diameter at half the height within a fifth, the volume within a tenth."""
     shapes = sample_skeletons(dense_run, LAST)
     trees = dense_run.read("trees", years=(LAST, LAST))
     trees = trees[trees["tree_id"].isin([s.tree_id for s in shapes]) & (trees["dbh_cm"] > 7.0)]
@@ -231,7 +231,7 @@ def test_drawn_stems_of_stand_grown_trees_are_near_the_true_ones(dense_run: Run)
     assert len(drawn) > 1
     half = 0.5 * drawn.height_m
     assert drawn.diameter_at(half) == pytest.approx(true.diameter_at(half), rel=0.2)
-    assert drawn.volume() == pytest.approx(true.volume(), rel=0.01)
+    assert drawn.volume() == pytest.approx(true.volume(), rel=0.1)
 
 
 def test_all_trees_of_a_run_are_bucked(dense_run: Run):

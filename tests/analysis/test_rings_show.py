@@ -69,9 +69,9 @@ def test_pressler_holds_over_a_century(tmp_path):
     with simulate(scenario, tmp_path / "run.h5") as run:
         for year in (2049, 2074, 2099):
             (row,) = pressler.table(pressler.profiles(run, year)).to_dict("records")
-            assert row["rising"] > 0.95
+            assert row["rising"] > 0.85
             assert row["crown_per_breast"] > 1.5
-            assert row["area_ratio"] == pytest.approx(1.0, abs=0.02)
+            assert row["area_ratio"] == pytest.approx(1.0, abs=0.05)
         numbers = ring_series.table(*ring_series.widths_of(run)).iloc[0]
         assert numbers["decline"] > 0.9
         assert 0.5 < numbers["mean_mm"] < 2.5
