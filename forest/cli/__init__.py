@@ -16,7 +16,7 @@ from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
 from forest.cli.measuring import bucking, measure
-from forest.cli.reading import info, picture, table
+from forest.cli.reading import info, picture, stability, table
 from forest.cli.shared import Stopped
 
 # The class of all wrong usage; which module holds it depends on typer's version.
@@ -38,7 +38,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (
-    run, sweep, check, table, info, export, measure, bucking, species, picture, version,
+    run, sweep, check, table, stability, info, export, measure, bucking, species, picture, version,
 ):  # fmt: skip
     app.command()(_command)
 
