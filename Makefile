@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := forest tests scenarios analysis docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-stand bench bench-quick lint format docs clean
+.PHONY: help setup demo test test-stand bench bench-quick lint format docs notebook clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -65,6 +65,10 @@ format: $(READY)  ## format the sources in place
 docs: $(READY)  ## build the documentation in docs/_build/html
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "docs: docs/_build/html/index.html"
+
+notebook: $(READY)  ## execute docs/notebooks/rings.ipynb again (installs Jupyter's kernel)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[notebook]'
+	@$(BIN)/python docs/notebooks/make_notebook.py
 
 clean:  ## remove what was built, but not .venv
 	@rm -rf out dist docs/_build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

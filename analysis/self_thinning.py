@@ -2,6 +2,8 @@
 
 `python analysis/self_thinning.py` grows `scenarios/self_thinning.toml` with three seeds, once more
 with weather, and the other species in pure stands; it writes docs/stands.md and its figure.
+
+`python analysis/self_thinning.py run.h5 --to line.png` draws the line of a run instead.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 import forest  # noqa: E402
+from analysis.common import Study, enough, panels, script  # noqa: E402
 from forest.dynamics.weather import income_factor  # noqa: E402
+from forest.record.run import Run  # noqa: E402
 
 SCENARIO = ROOT / "scenarios" / "self_thinning.toml"
 PAGE = ROOT / "docs" / "stands.md"
@@ -106,6 +110,36 @@ def thinning_slope(stand: pd.DataFrame) -> float:
     """Fit d ln N / d ln Dq from the onset of mortality on (Reineke 1933: about -1.6)."""
     past = stand.loc[onset(stand) :]
     return float(np.polyfit(np.log(past["qmd_cm"]), np.log(past["n_ha"]), 1)[0])
+
+
+def study(run: Run) -> Study:
+    """Draw number over mean diameter of a run's trees, all species together.
+
+    The numbers are the onset of mortality (`age`), the `slope` from then on, and number,
+    diameter and Reineke's index in the last year.
+    """
+    table = run.read("stand", ["species", "n_ha", "qmd_cm", "sdi"])
+    stand = table[table["species"].astype(str) == "all"].reset_index(drop=True)
+    stand.index = pd.RangeIndex(1, len(stand) + 1, name="age")
+    stand = stand[stand["qmd_cm"] > 0.0]
+    enough(stand, "tree of 1.3 m", run)
+    figure, ((axes,),) = panels(1, size=(5.0, 4.0))
+    start = onset(stand)
+    axes.loglog(stand["qmd_cm"], stand["n_ha"], "k", lw=1.6, label="stand")
+    axes.plot(*stand.loc[start, ["qmd_cm", "n_ha"]], "ko", ms=5, label=f"onset, age {start}")
+    thickest = float(stand["qmd_cm"].max())
+    across = np.array([0.2 * thickest, thickest])
+    for index in (250, 500, 1000):
+        line = index * (across / 25.4) ** -1.605
+        axes.plot(across, line, color="0.7", lw=0.8, ls=":", zorder=0)
+        axes.annotate(f" SDI {index}", (across[1], line[1]), color="0.5", fontsize=8, va="center")
+    numbers = stand["n_ha"]
+    axes.set(xlabel="Dq, cm", ylabel="trees per ha", xlim=(across[0], 1.1 * thickest))
+    axes.set(ylim=(0.7 * numbers.min(), 1.5 * numbers.max()))
+    axes.legend(frameon=False, fontsize=8)
+    last = stand.iloc[-1]
+    row = {"age": start, "slope": thinning_slope(stand) if len(stand.loc[start:]) > 1 else np.nan}
+    return Study(figure, pd.DataFrame([{**row, **last[["n_ha", "qmd_cm", "sdi"]]}]))
 
 
 def follows_weather(history: History, from_age: int = 20) -> tuple[float, float]:
@@ -222,7 +256,16 @@ def _draw(pines: dict[int, History], weather: History) -> None:
     figure.savefig(FIGURE, dpi=110)
 
 
-def main() -> None:
+def main(words: Sequence[str] | None = None) -> None:
+    """Draw the line of a run, or grow all stands and write the page."""
+    words = sys.argv[1:] if words is None else words
+    if words:
+        script("The line of self-thinning of a run.", study, words)
+    else:
+        write_page()
+
+
+def write_page() -> None:
     """Grow all stands and write the page."""
     pines = {seed: self_thinning(seed) for seed in SEEDS}
     weather = with_weather(SEEDS[0])

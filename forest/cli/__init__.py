@@ -15,6 +15,7 @@ import typer
 from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
+from forest.cli.measuring import bucking, measure
 from forest.cli.reading import info, picture, stability, table
 from forest.cli.shared import Stopped
 
@@ -36,7 +37,9 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (run, sweep, check, table, stability, info, export, species, picture, version):
+for _command in (
+    run, sweep, check, table, stability, info, export, measure, bucking, species, picture, version,
+):  # fmt: skip
     app.command()(_command)
 
 

@@ -187,7 +187,8 @@ def _best_cuts(
                 continue
             price = products[cut.product].price_m3
             worth = price * (volume[:, end] - volume[:, here]) + best[:, end]
-            better = thick[cut.product][:, end] & (end <= modules) & (worth > value)
+            more = worth > value * (1.0 + _EQUAL)
+            better = thick[cut.product][:, end] & (end <= modules) & more
             value[better] = worth[better]
             made[better] = k
         left = best[:, here + 1]

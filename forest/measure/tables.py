@@ -30,6 +30,7 @@ from forest.measure.density import curtis_rd, summation_sdi
 from forest.measure.stand import Plot
 from forest.measure.stem import Stems, stems_of, stems_of_skeletons
 from forest.measure.structure import Neighbours, mingling
+from forest.measure.taper import RINGS_READ, disc_diameters, taper_stems
 from forest.measure.volumes import form_factor, normal_form_factor
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def measure_run(run: Run, year: int) -> pd.DataFrame:
     InputError
         If the run has no such year.
     """
-    _check_year(run, year)
+    check_year(run, year)
     trees = run.read("trees", years=(year, year))
     scenario = run.scenario
     columns = tree_columns(trees, scenario.species_list, plot_of(scenario))
@@ -194,32 +195,46 @@ def stand_indices(trees: pd.DataFrame, plot: Plot) -> dict[str, float]:
 def buck_run(
     run: Run, year: int, products: Sequence[Product], *, module_m: float = MODULE_M
 ) -> pd.DataFrame:
-    """Cut the sample trees of a run as they stood in a year; see `forest.measure.bucking.buck`.
+    """Cut the trees of a run as they stood in a year; see `forest.measure.bucking.buck`.
+
+    Sample trees are cut along their own stems, all others along stems drawn through their discs
+    (`forest.measure.taper`).
 
     Returns
     -------
     pandas.DataFrame
-        The logs, with `tree_id` and `species` in place of `stem`.
+        The logs, with `tree_id`, `species` and `stem` (`exact` or `drawn`) in place of `stem`.
 
     Raises
     ------
     InputError
-        If the run has no such year or no sample tree then, or a product is not right.
+        If the run has no such year or no table of trees or rings, or a product is not right.
     """
-    _check_year(run, year)
-    shapes = sample_skeletons(run, year)
-    if not shapes:
-        raise InputError(
-            f"no sample tree lived in {year}",
-            where=str(run.path),
-            expected="sample trees: output.sample_trees in the scenario",
-        )
+    import pandas as pd
+
+    check_year(run, year)
     of = {s.name: s.mensuration for s in run.scenario.species_list}
-    stump = [of[skeleton.species].stump_height_m for skeleton in shapes]
-    stems = stems_of_skeletons(shapes, _bark_factors(run.scenario, shapes))
-    logs = buck(stems, products, stump_m=stump, module_m=module_m)
-    ids = np.array([skeleton.tree_id for skeleton in shapes])
-    return _name_trees(logs, ids, [skeleton.species for skeleton in shapes])
+    trees = run.read("trees", years=(year, year))
+    trees = trees[trees["stem_volume_m3"] > 0.0]
+    shapes = sample_skeletons(run, year)
+    exact = stems_of_skeletons(shapes, _bark_factors(run.scenario, shapes))
+    ids = np.array([skeleton.tree_id for skeleton in shapes], np.int64)
+    kinds = [skeleton.species for skeleton in shapes]
+    others = trees[~trees["tree_id"].isin(ids)]
+    bark = np.array([of[name].bark_factor for name in others["species"]], np.float64)
+    rings = run.read("rings", RINGS_READ, years=(int(run.years[0]), year))
+    drawn = taper_stems(others, disc_diameters(rings), bark)
+    logs = []
+    for name, stems, number, species in (
+        ("exact", exact, ids, kinds),
+        ("drawn", drawn, others["tree_id"].to_numpy(), others["species"].tolist()),
+    ):
+        stump = np.array([of[one].stump_height_m for one in species], np.float64)
+        cut = buck(stems, products, stump_m=stump, module_m=module_m)
+        part = _name_trees(cut, number, species)
+        part.insert(2, "stem", pd.Categorical([name] * len(part), ["exact", "drawn"]))
+        logs.append(part)
+    return pd.concat(logs).sort_values(["tree_id", "log"], ignore_index=True)
 
 
 def buck_stand(
@@ -260,7 +275,8 @@ def _with_columns(trees: pd.DataFrame, columns: dict[str, NDArray[np.float64]]) 
     return pd.DataFrame({**dict(trees.items()), **columns})
 
 
-def _check_year(run: Run, year: int) -> None:
+def check_year(run: Run, year: int) -> None:
+    """Refuse a year that is not on file."""
     if year in run.years:
         return
     years = f"a year from {run.years[0]} to {run.years[-1]}" if len(run.years) else "a whole year"
