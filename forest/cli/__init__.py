@@ -16,6 +16,7 @@ from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
 from forest.cli.reading import info, picture, table
+from forest.cli.ringing import rings
 from forest.cli.shared import Stopped
 
 # The class of all wrong usage; which module holds it depends on typer's version.
@@ -36,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (run, sweep, check, table, info, export, species, picture, version):
+for _command in (run, sweep, check, table, info, rings, export, species, picture, version):
     app.command()(_command)
 
 

@@ -42,6 +42,8 @@ class StemRings(NamedTuple):
         0 to 1.
     thick_side_deg : float64 (n,)
         Azimuth of the thick side, degrees from x towards y; 0 where the ring has none.
+    undated_mm : float
+        Radius of the wood inside the innermost ring, mm, where it was not on record; else 0.
     """
 
     tree_id: int
@@ -52,6 +54,7 @@ class StemRings(NamedTuple):
     width_mm: NDArray[np.float64]
     eccentricity: NDArray[np.float64]
     thick_side_deg: NDArray[np.float64]
+    undated_mm: float = 0.0
 
 
 def stem_rings(rings: pd.DataFrame) -> list[StemRings]:
@@ -164,4 +167,14 @@ def _one_stem(
     every = np.arange(place[-1] + 1)
     ages = age[first] + every
     ages[place] = age[first:]
-    return StemRings(tree_id, species, stem_height_m, year[first] + every, ages, *columns)
+    width, eccentricity, thick_side = columns
+    return StemRings(
+        tree_id,
+        species,
+        stem_height_m,
+        year[first] + every,
+        ages,
+        width,
+        eccentricity,
+        thick_side,
+    )
