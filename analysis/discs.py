@@ -41,10 +41,11 @@ def offset(disc: Disc) -> float:
 
 
 def along_pith(stem: StemLife) -> tuple[np.ndarray, np.ndarray, float]:
-    """Fit a plane to a stem's pith: a point, the normal, the pith's largest distance per radius."""
-    middle = stem.end.mean(axis=0)
-    normal = np.linalg.svd(stem.end - middle)[2][2]
-    return middle, normal, float((np.abs((stem.end - middle) @ normal) / stem.radius[-1]).max())
+    """Fit a plane to a stem's pith up to 7 m: a point, the normal, how far off the pith is, m."""
+    pith = stem.end[stem.end[:, 2] < 7.0]
+    middle = pith.mean(axis=0)
+    normal = np.linalg.svd(pith - middle)[2][2]
+    return middle, normal, float(np.abs((pith - middle) @ normal).max())
 
 
 def main() -> None:
@@ -64,7 +65,7 @@ def main() -> None:
             straightest = min(fits, key=lambda i: fits[i][2])
             middle, normal, _ = fits[straightest]
             board = run.section(straightest, middle, normal)
-            draw_section(board, TO / "board.png", widen=12.0)
+            draw_section(board, TO / "board.png", widen=8.0, length_m=6.0)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -138,6 +139,8 @@ def rings_at(rings: pd.DataFrame, tree_id: int, stem_height_m: float) -> StemRin
 
 def at_height(rings: pd.DataFrame, stem_height_m: float) -> NDArray[np.bool_]:
     """Tell which rows are of a stem height, to the millimetre."""
+    if not math.isfinite(stem_height_m):
+        raise InputError(f"height {stem_height_m:g}", where="rings", expected="a number of metres")
     return np.asarray(_in_mm(rings) == round(1000.0 * stem_height_m))
 
 

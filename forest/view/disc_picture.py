@@ -77,7 +77,12 @@ def draw_disc(disc: Disc, to: str | Path, *, conifer: bool = True) -> None:
 
 
 def draw_section(
-    section: Section, to: str | Path, *, conifer: bool = True, widen: float = 1.0
+    section: Section,
+    to: str | Path,
+    *,
+    conifer: bool = True,
+    widen: float = 1.0,
+    length_m: float | None = None,
 ) -> None:
     """Draw the section of a stem by a plane, and save the picture.
 
@@ -90,9 +95,15 @@ def draw_section(
         Colours of a conifer's wood or a broadleaf's.
     widen : float
         How many times wider than high a metre is drawn: rings along a whole stem are seen then.
+    length_m : float, optional
+        How much of it is drawn, from its lowest point up, m; all if not given.
     """
     points = np.concatenate([loop for loops in section.outlines for loop in loops])
     low, high = points.min(axis=0), points.max(axis=0)
+    if length_m is not None:
+        high[1] = min(high[1], low[1] + length_m)
+        seen = points[points[:, 1] <= high[1]]
+        low[0], high[0] = seen[:, 0].min(), seen[:, 0].max()
     width, height = (high - low) * (widen, 1.0)
     scale = 9.0 / max(width, height)
     figure, axes = _sheet((max(3.0, 1.2 * scale * width), max(3.0, 1.1 * scale * height)))
@@ -102,7 +113,7 @@ def draw_section(
     _knots(axes, section.knots, section.outlines[-1])
     margin = 0.05 * float(max(width, height))
     axes.set_xlim(low[0] - margin / widen, high[0] + margin / widen)
-    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + (margin if length_m is None else 0.0))
     axes.set_title(
         f"Tree {section.tree_id}, {section.species.replace('_', ' ')}, {section.years[-1]}"
         + (f"\n{widen:g} times as wide as it is" if widen != 1.0 else ""),
@@ -260,8 +271,8 @@ def _point_out_thick_side(axes: Any, disc: Disc) -> None:
 
 def _scale_bar(axes: Any, x: float, y: float, room: float) -> None:
     """Draw a bar of a round length, at most as long as there is room."""
-    exponent = np.floor(np.log10(room))
-    length = max(s * 10.0**exponent for s in (1.0, 2.0, 5.0) if s * 10.0**exponent <= room)
+    decade = 10.0 ** np.floor(np.log10(room))
+    length = decade * max(s for s in (1.0, 2.0, 5.0) if s == 1.0 or s * decade <= room)
     axes.plot([x, x + length], [y, y], color=_INK, lw=2.5, solid_capstyle="butt")
     text = f"{length:g} m" if length >= 1.0 else f"{100.0 * length:g} cm"
     axes.text(x + length, y, f"  {text}", va="center", fontsize=8, color=_INK)
