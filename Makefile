@@ -36,16 +36,16 @@ demo: $(READY)  ## grow the Saxony spruce stand for 60 years, print its table, d
 # takes a copy of that cache (tests/conftest.py).
 test: $(READY)  ## the ordinary tests, on two processes
 	@$(BIN)/python -m forest.warm
-	@$(BIN)/python -m pytest -n 2 --dist loadfile
+	@$(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 test-stand: $(READY)  ## tests on whole stands (minutes)
 	@$(BIN)/python -m forest.warm
-	@$(BIN)/python -m pytest -m stand
+	@$(BIN)/python -m pytest -q -m stand
 
 bench: $(READY)  ## benchmarks: time and memory per metamer; a quarter of an hour
 	@$(BIN)/python -m forest.warm
 	@$(BIN)/python -m tests.benchmarks --out out/bench.json
-	@$(BIN)/python -m pytest -m bench
+	@$(BIN)/python -m pytest -q -m bench
 
 bench-quick: $(READY)  ## the same on smaller stands, in two minutes
 	@$(BIN)/python -m forest.warm

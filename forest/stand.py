@@ -10,18 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest import management
-from forest.dynamics.planting import check_planting, seedlings
+from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
 from forest.growth.allocate import allocate
 from forest.growth.dealing import Deal, Workbench, deal
 from forest.growth.parameters import Year, species_traits
-from forest.growth.pipes import thicken
+from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds, sprout
 from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
+from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.stand_state import put_state, take_state
 from forest.trees import table
@@ -72,7 +73,7 @@ class Stand:
     def __init__(self, scenario: Scenario) -> None:
         self._start(scenario)
         x, y, species = scenario.planting_positions()
-        self._plant(x, y, species)
+        self._plant(x, y, species, headings(*scenario.planting_leans()))
         management.check_due(self)  # what cannot be done in the first year is refused before it
 
     def _start(self, scenario: Scenario) -> None:
@@ -92,7 +93,8 @@ class Stand:
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
-            self.mechanics = Mechanics(spec, self.species, self.pipe_exponent)
+            plot = Plot(*scenario.plot.size_m, scenario.plot.boundary == "periodic")
+            self.mechanics = Mechanics(spec, self.species, self.pipe_exponent, plot)
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -162,7 +164,7 @@ class Stand:
             shared,
             self._bench.scratch(shared),
             self._traits,
-            not self._paper,
+            not self._paper or bool(self.arena.companions),  # it may have bent below the ground
         )
         self._lap("shed")
 
@@ -196,6 +198,9 @@ class Stand:
         return RingYear(self.year, self.steps, self._pipes_before, self.pipe_exponent)
 
     def _thicken(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
+        wind_need = NO_NEED
+        if self.mechanics is not None and self.mechanics.wind_growth:
+            wind_need = self.mechanics.feel_wind(self.arena, self.rows, shared)
         thicken(
             self.arena.metamers,
             self.rows,
@@ -204,6 +209,7 @@ class Stand:
             self._traits,
             year,
             accounts,
+            wind_need,
         )
         self._lap("thicken")
 
@@ -264,7 +270,13 @@ class Stand:
     # ------------------------------------------------------------------ acts between years
 
     def plant(
-        self, x: Sequence[float], y: Sequence[float], species: str | Sequence[str]
+        self,
+        x: Sequence[float],
+        y: Sequence[float],
+        species: str | Sequence[str],
+        *,
+        lean_deg: float | Sequence[float] = 0.0,
+        lean_azimuth_deg: float | Sequence[float] = 0.0,
     ) -> list[int]:
         """Plant seedlings; they start to grow with the next step.
 
@@ -274,6 +286,9 @@ class Stand:
             Places, m, inside the plot.
         species : str or sequence of str
             Name or names of species of the scenario.
+        lean_deg, lean_azimuth_deg : float or sequence of float
+            Angle of the stems to the vertical, 0 to 85, and the direction towards which they lean,
+            from x to y.
 
         Returns
         -------
@@ -284,13 +299,21 @@ class Stand:
         at = np.asarray(x, np.float64), np.asarray(y, np.float64)
         width, depth = self.scenario.plot.size_m
         check_planting(*at, names, (width, depth), self.species_names)
+        leans = check_leans(len(x), lean_deg, lean_azimuth_deg)
         if self.scenario.plot.boundary == "periodic":
             at = at[0] % width, at[1] % depth
         first = self.next_id
-        self._plant(*at, np.array([self.species_names.index(name) for name in names], np.int16))
+        codes = np.array([self.species_names.index(name) for name in names], np.int16)
+        self._plant(*at, codes, headings(*leans))
         return list(range(first, self.next_id))
 
-    def _plant(self, x: NDArray[np.float64], y: NDArray[np.float64], species: NDArray[Any]) -> None:
+    def _plant(
+        self,
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        species: NDArray[Any],
+        heading: NDArray[np.float64],
+    ) -> None:
         more = seedlings(
             x,
             y,
@@ -309,7 +332,9 @@ class Stand:
         wanted = rows.size.astype(np.int64)
         wanted[first_row:] = 1
         self.arena.make_room(rows.start, rows.size, rows.room, wanted)
-        sprout(self.arena.metamers, rows, first_row, self._traits, self._year())
+        sprout(self.arena.metamers, rows, first_row, heading, self._traits, self._year())
+        for field in self.arena.companions:
+            field[rows.start[first_row:]] = 0  # they get their rods with their first year
         measures = self.measure()
         for row in range(first_row, len(rows.tree_id)):
             self.pending.append(Event.of(self, row, "planted", "none", measures))
@@ -419,7 +444,8 @@ class Stand:
         row = self.row_of(tree_id)
         kind = int(self.rows.species[row])
         metamers, rows = self.arena.metamers, self.rows
-        if season == "winter" and self.mechanics is not None:
+        bent = int(rows.birth[row]) < self.steps  # a seedling just planted has no rods yet
+        if season == "winter" and self.mechanics is not None and bent:
             metamers, rows = self.mechanics.winter(self.arena, self.rows, row)
             row = 0
         return skeleton_of(

@@ -35,7 +35,8 @@ _VARIANTS = {
         "environment={rendered={response='flat_above_20'}}",
         'obstacles=[{ kind = "box", min_m = [0, 0, 0], max_m = [1, 1, 2] }]',
     ],
-    "light, costs, mechanics": ["mechanics={}"],
+    "light, costs, mechanics": ["mechanics={wind_m_s=10, wind_growth=true}"],
+    "light, costs, stability": ["mechanics={bending=false}"],
     "light and markers": ["environment={shadow={}, canopy={}, markers={}}"],
 }
 

@@ -143,7 +143,7 @@ def record_year(
         "carbon": _carbon_rows(stand, accounts),
     }
     if stand.mechanics is not None:
-        tables["stability"] = _stability_rows(stand, living, of_living)
+        tables["stability"] = _stability_rows(stand, living)
     return YearRecord(stand.year, tables, _sample_years(stand, dead, serials_before))
 
 
@@ -183,11 +183,9 @@ def _ring_rows(
     return {**columns, "eccentricity": eccentricity, "thick_side_deg": side}
 
 
-def _stability_rows(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> Columns:
+def _stability_rows(stand: Stand, trees: table.Trees) -> Columns:
     assert stand.mechanics is not None
-    tall = measures.height_m[measures.height_m > 0.0]
-    canopy_height = float(np.quantile(tall, 0.9)) if len(tall) else 0.0
-    found = stand.mechanics.stability(stand.arena, trees, canopy_height)
+    found = stand.mechanics.stability(stand.arena, trees)
     n = len(trees.tree_id)
     return {
         "year": np.full(n, stand.year, np.int32),

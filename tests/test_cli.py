@@ -210,3 +210,18 @@ def test_reader_that_leaves_hears_no_complaint(tmp_path: Path, words: list[str])
     finally:
         os.close(write)
     assert (answer.returncode, answer.stderr) == (1, "")
+
+
+def test_a_stand_that_bends(folder: Path, tmp_path: Path) -> None:
+    out, table = tmp_path / "bent.h5", tmp_path / "stability.csv"
+    sets = ["--set", "mechanics={wind_m_s=15}", "--years", "4"]
+    code, summary, err = forest("check", folder / "tiny.toml", *sets[:2])
+    assert (code, err) == (0, "")
+    assert "bending, righting strain, wind 15 m/s" in summary
+    assert forest("run", folder / "tiny.toml", "--out", out, *sets)[0] == 0
+    assert "stability (40)" in forest("info", out)[1]
+    assert forest("table", out)[0] == 0
+    assert forest("export", out, "--table", "stability", "--to", table)[0] == 0
+    first, *rows = table.read_text().splitlines()
+    assert first.startswith("year,tree_id,species,safety_factor,")
+    assert len(rows) == 40

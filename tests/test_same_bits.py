@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from forest._threads import using_threads
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
 from forest.simulation import simulate
@@ -21,7 +22,6 @@ from tests.tiny import (
     assert_same_years,
     steps,
     tiny,
-    write_tiny,
 )
 
 ENVIRONMENTS = {
@@ -29,6 +29,12 @@ ENVIRONMENTS = {
     "canopy": ["environment={shadow={}, canopy={}}"],
     "markers": ["environment={shadow={}, markers={release=false}}"],
     "markers released": ["environment={markers={release=true}}"],
+}
+MECHANICS = {
+    "bending": ["mechanics={wind_m_s=15}"],
+    "bending, growth in the wind": ["mechanics={wind_m_s=15, wind_growth=true}"],
+    "bending, printed righting": ["mechanics={righting='beta'}"],
+    "stiff": ["mechanics={bending=false}"],
 }
 MATRIX = list(
     itertools.product(
@@ -95,12 +101,18 @@ simulate(Scenario.load(sys.argv[1]).with_overrides(["output.checkpoint_every_yea
 """
 
 
-def test_killed_and_resumed(straight: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("mechanics", ["", "mechanics={}"])
+def test_killed_and_resumed(straight: Run, tmp_path: Path, mechanics: str) -> None:
     """SIGKILL somewhere in a year, in its record or its checkpoint; three times."""
+    changes = [mechanics] if mechanics else []
+    if mechanics:
+        straight = simulate(tiny(mechanics), tmp_path / "straight.h5", threads=1)
     out = tmp_path / "run.h5"
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text(tiny(*changes).to_toml())
     for moment in ("0.05", "0.5", "0.9"):
         child = subprocess.run(
-            [sys.executable, "-c", DIES, write_tiny(tmp_path), out, moment],
+            [sys.executable, "-c", DIES, scenario, out, moment],
             capture_output=True,
             text=True,
             check=False,
@@ -108,7 +120,7 @@ def test_killed_and_resumed(straight: Run, tmp_path: Path) -> None:
         assert child.returncode in (-signal.SIGKILL, 0), child.stderr
     assert latest_checkpoint(out) is not None
     every = "output.checkpoint_every_years=1"
-    with simulate(tiny(every), out, resume=True) as run:
+    with simulate(tiny(every, *changes), out, resume=True) as run:
         assert len(run.provenance["sessions"]) > 1
         assert_same_runs(straight, run)
 
@@ -135,6 +147,28 @@ def test_restored_stand_goes_on_the_same(
     assert_same_years(after, steps(restored, 3))
     assert_same_state(whole, restored)
     assert_same_years([*before, *after], steps(Stand(scenario), 6))
+
+
+@pytest.mark.parametrize("mechanics", MECHANICS)
+def test_bent_stand_on_threads_and_restored(tmp_path: Path, mechanics: str) -> None:
+    """One thread, two, and a checkpoint amid the years: the same shapes, rings and stability."""
+    scenario = tiny(*MECHANICS[mechanics])
+    whole = Stand(scenario)
+    with using_threads(1):
+        before = steps(whole, 4)
+        arrays, meta = whole.state()
+        write_checkpoint(tmp_path / "run.h5", arrays, meta, step=4)
+        after = steps(whole, 4)
+    assert "stability" in after[-1].tables
+    found = latest_checkpoint(tmp_path / "run.h5")
+    assert found is not None
+    restored = Stand.restore(scenario, *found)
+    other = Stand(scenario)
+    with using_threads(2):
+        assert_same_years(after, steps(restored, 4))
+        assert_same_years([*before, *after], steps(other, 8))
+    assert_same_state(whole, restored)
+    assert_same_state(whole, other)
 
 
 def test_two_stands_do_not_touch_each_other() -> None:

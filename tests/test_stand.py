@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,6 +118,32 @@ def test_planting_is_checked(
     with pytest.raises(InputError, match=says):
         stand.plant(x, y, species)
     assert len(stand.trees) == TREES
+
+
+def test_seedlings_may_be_planted_leaning(stand: Stand) -> None:
+    ids = stand.plant(
+        [1.0, 2.0], [2.0, 2.0], "pinus_sylvestris", lean_deg=[30.0, 0.0], lean_azimuth_deg=90.0
+    )
+    leaning, upright = (stand.skeleton(tree_id) for tree_id in ids)
+    length = leaning.length[0]
+    reach = leaning.end[0] - leaning.start[0]
+    np.testing.assert_allclose(
+        reach, length * np.array([0.0, 0.5, np.sqrt(0.75)]), atol=1e-6 * length
+    )
+    assert (upright.end[0] - upright.start[0]).tolist()[:2] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("leans", "says"),
+    [
+        ({"lean_deg": 90.0}, "lean_deg = 90.0.*0 to 85"),
+        ({"lean_deg": [1.0, 2.0]}, "one for all trees or one for each"),
+        ({"lean_azimuth_deg": np.nan}, "lean_azimuth_deg = nan.*-360 to 360"),
+    ],
+)
+def test_leaning_is_checked(stand: Stand, leans: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        stand.plant([1.0], [1.0], "pinus_sylvestris", **leans)
 
 
 def test_pruning_takes_a_branch_and_what_it_carries(stand: Stand) -> None:

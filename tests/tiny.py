@@ -89,7 +89,10 @@ def assert_same_runs(one: Run, other: Run) -> None:
 
 def _assert_equal_tuples(one: Any, other: Any) -> None:
     for a, b in zip(one, other, strict=True):
-        np.testing.assert_array_equal(a, b)
+        if isinstance(a, tuple):
+            _assert_equal_tuples(a, b)
+        else:
+            np.testing.assert_array_equal(a, b)
 
 
 def forest(*words: str | Path) -> tuple[int, str, str]:

@@ -15,7 +15,7 @@ import typer
 from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
-from forest.cli.reading import info, picture, table
+from forest.cli.reading import info, picture, stability, table
 from forest.cli.ringing import rings
 from forest.cli.shared import Stopped
 
@@ -37,7 +37,19 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (run, sweep, check, table, info, rings, export, species, picture, version):
+for _command in (
+    run,
+    sweep,
+    check,
+    table,
+    stability,
+    rings,
+    info,
+    export,
+    species,
+    picture,
+    version,
+):
     app.command()(_command)
 
 

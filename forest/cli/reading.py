@@ -41,6 +41,46 @@ def info(run_file: RunFile) -> None:
         print_pairs(describe_run(run))
 
 
+def stability(
+    run_file: RunFile,
+    year: Annotated[int | None, typer.Option(help="Default: the run's last year.")] = None,
+    to: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The table as .csv or .parquet, or a picture, .png."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Say how safely the trees of a run stand, by species and size class.
+
+    Examples:
+
+        forest stability run.h5
+
+        forest stability run.h5 --year 2040 --to stability.png
+    """
+    from forest.record.export import write_frame
+    from forest.record.run import open_run
+    from forest.view.stability_table import classes, stability_of_year, stability_table
+
+    drawn = to is not None and to.suffix.lower() == ".png"
+    if to is not None and drawn:
+        check_picture(to, force)
+    with open_run(run_file) as run:
+        trees = stability_of_year(run, year)
+    if to is None:
+        from rich.console import Console
+
+        Console().print(stability_table(trees))
+    elif drawn:
+        from forest.view.stability_picture import draw_stability
+
+        draw_stability(trees, to)
+        typer.echo(f"{to}: {len(trees)} trees")
+    else:
+        rows = write_frame(lambda: classes(trees), to, overwrite=force)
+        typer.echo(f"{to}: {rows} classes")
+
+
 def picture(
     run_file: RunFile,
     to: Annotated[

@@ -16,6 +16,54 @@ from forest.trees.table import Trees, empty
 _CUT = 2.5
 
 
+def check_leans(
+    n: int, lean_deg: float | Sequence[float], azimuth_deg: float | Sequence[float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the angles of n stems, or refuse them; one may stand for all.
+
+    Raises
+    ------
+    InputError
+        If there are not as many as trees, or one is out of range.
+    """
+    angles = []
+    for key, value, low, high in (
+        ("lean_deg", lean_deg, 0.0, 85.0),
+        ("lean_azimuth_deg", azimuth_deg, -360.0, 360.0),
+    ):
+        angle = np.asarray(value, np.float64)
+        if angle.shape not in ((), (n,)) or not ((angle >= low) & (angle <= high)).all():
+            raise InputError(
+                f"{key} = {value}",
+                where="Stand.plant",
+                expected=f"{low:g} to {high:g} degrees, one for all trees or one for each",
+            )
+        angles.append(np.broadcast_to(angle, n))
+    return angles[0], angles[1]
+
+
+def headings(
+    lean_deg: NDArray[np.float64], azimuth_deg: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Give the directions of stems that lean.
+
+    Parameters
+    ----------
+    lean_deg : float64 (n,)
+        Angle to the vertical.
+    azimuth_deg : float64 (n,)
+        Direction towards which they lean, from x to y.
+
+    Returns
+    -------
+    float64 (n, 3)
+        Unit vectors.
+    """
+    lean, azimuth = np.radians(lean_deg), np.radians(azimuth_deg)
+    side = np.sin(lean)
+    return np.stack((side * np.cos(azimuth), side * np.sin(azimuth), np.cos(lean)), axis=1)
+
+
 def seedlings(
     x: NDArray[np.float64],
     y: NDArray[np.float64],

@@ -254,7 +254,10 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
 
 @njit
 def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, work, ints):  # type: ignore[no-untyped-def]
-    """The annual mass balance of one tree: income, costs, spend, and what buds may make."""
+    """The annual mass balance of one tree: income, costs, spend, and what buds may make.
+
+    The wind's stress beyond its limit cuts what buds may spend: loaded stems stay shorter.
+    """
     s = trees.start[row]
     n = trees.size[row]
     e = s + n
@@ -279,7 +282,7 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
 
     price = unit_costs(t, sp)
     pipe_cost = 0.25 * np.pi * t.of[sp].density * t.of[sp].first_pipe ** 2
-    budget = (1.0 - t.of[sp].ring_fraction) * spend
+    budget = (1.0 - t.of[sp].ring_fraction) * spend / max(1.0, np.float64(trees.wind_stress[row]))
     if balance is None:
         q_base = gather_light(tree.parent, tree.state, tree.light, work[0], work[1])
         age = np.float64(year.step - trees.birth[row])

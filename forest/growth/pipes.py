@@ -30,6 +30,9 @@ from forest.growth.parameters import SpeciesTraits, Year
 from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
 
+#: Means: growth knows no wind.
+NO_NEED: NDArray[np.float32] = np.empty(0, np.float32)
+
 
 @njit
 def add_pipes(parent, birth, step, pipe, strand, flow):  # type: ignore[no-untyped-def]
@@ -44,7 +47,7 @@ def add_pipes(parent, birth, step, pipe, strand, flow):  # type: ignore[no-untyp
 
 
 @njit
-def reinforce(parent, length, pipe, state, wood, fresh, budget, work):  # type: ignore[no-untyped-def]
+def reinforce(parent, length, pipe, state, wood, fresh, least, budget, work):  # type: ignore[no-untyped-def]
     """Thicken first what is thinner than its load needs.
 
     Every metamer must support the mass that it carries: needs_to_support(M, d) = sqrt(M / (k d))
@@ -60,6 +63,8 @@ def reinforce(parent, length, pipe, state, wood, fresh, budget, work):  # type: 
     fresh : (wood, leaf, sag)
         Fresh per dry mass of wood and of leaves; d^4 per fresh mass and squared distance that
         keeps the sag at its limit, m2/kg; 0 where trees do not bend.
+    least : float32 (n,)
+        d^2 that the wind asks for, m2; empty where growth knows no wind.
     budget : float
         Dry mass at hand, kg; the reinforcement is scaled down to it.
     work : float64 (4, n)
@@ -95,6 +100,8 @@ def reinforce(parent, length, pipe, state, wood, fresh, budget, work):  # type: 
         if sag > 0.0 and weight[i] > 0.0:
             turning = max(moment[i] + weight[i] * np.float64(length[i]), 0.0)
             needed = max(needed, np.sqrt(sag / weight[i]) * turning)
+        if len(least) > 0:
+            needed = max(needed, np.float64(least[i]))
         lack[i] = max(0.0, needed - np.float64(pipe[i]))
         cost += volume * lack[i] * np.float64(length[i])
     if cost <= 0.0:
@@ -142,7 +149,7 @@ def _favour_light_side(arena, s, e, t, sp, year, surplus, work, ints):  # type: 
 
 
 @njit
-def _thicken_balanced(arena, trees, row, t, year, accounts, work, ints):  # type: ignore[no-untyped-def]
+def _thicken_balanced(arena, trees, row, t, year, wind_need, accounts, work, ints):  # type: ignore[no-untyped-def]
     """Book the extension, then lay down this year's ring out of the rest of the spend."""
     s = trees.start[row]
     n = trees.size[row]
@@ -187,7 +194,8 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work, ints):  # type
     rest = max(accounts[row, SPEND] - extension, 0.0)
     wood = (t.of[sp].density, t.of[sp].support, t.of[sp].leaf_mass)
     fresh = (t.of[sp].fresh_wood, t.of[sp].fresh_leaf, t.of[sp].sag)
-    support = reinforce(parent, length, pipe, state, wood, fresh, rest, work[4:8])
+    least = wind_need[s:e]
+    support = reinforce(parent, length, pipe, state, wood, fresh, least, rest, work[4:8])
     ring = rest - support
     if total > 0.0:
         per_surplus = ring / (volume * total)
@@ -215,7 +223,7 @@ def _thicken_balanced(arena, trees, row, t, year, accounts, work, ints):  # type
 
 
 @driver
-def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, accounts):  # type: ignore[no-untyped-def]
+def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, wind_need, accounts):  # type: ignore[no-untyped-def]
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
@@ -246,7 +254,7 @@ def _thicken_chunks(first, step, arena, trees, shared, scratch, traits, year, ac
             else:
                 g = shared.place[b] * INTEGERS
                 ints = scratch.integers[g : g + INTEGERS * n].reshape((INTEGERS, n))
-                _thicken_balanced(arena, trees, row, traits, year, accounts, work, ints)
+                _thicken_balanced(arena, trees, row, traits, year, wind_need, accounts, work, ints)
 
 
 def thicken(
@@ -257,6 +265,10 @@ def thicken(
     traits: SpeciesTraits,
     year: Year,
     accounts: NDArray[np.float64],
+    wind_need: NDArray[np.float32] = NO_NEED,
 ) -> None:
-    """Thicken all trees; in mass-balance mode book extension and ring in `accounts`."""
-    in_threads(_thicken_chunks, arena, trees, shared, scratch, traits, year, accounts)
+    """Thicken all trees; in mass-balance mode book extension and ring in `accounts`.
+
+    `wind_need` (capacity of the arena,) is the d^2 that the wind asks of each metamer, m2.
+    """
+    in_threads(_thicken_chunks, arena, trees, shared, scratch, traits, year, wind_need, accounts)

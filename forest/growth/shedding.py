@@ -1,7 +1,8 @@
 """Branches that earn too little for their size are dropped: Palubicki et al. 2009, section 4.4.
 
 The light gathered by a branch is compared with its size in internodes (Takenaka 1994). In
-mass-balance mode a part without a living site is dropped as well, whatever its light.
+mass-balance mode and where trees bend a part without a living site is dropped as well, whatever its
+light: in paper mode it only loses them below the ground.
 """
 
 from __future__ import annotations

@@ -359,8 +359,14 @@ def extend(
 
 
 @njit
-def sprout(arena: Metamers, trees: Trees, first_row, traits: SpeciesTraits, year: Year):  # type: ignore[no-untyped-def]
-    """Give each tree from `first_row` on its first metamer, upright and with a terminal bud."""
+def sprout(arena: Metamers, trees: Trees, first_row, heading, traits: SpeciesTraits, year: Year):  # type: ignore[no-untyped-def]
+    """Give each tree from `first_row` on its first metamer, with a terminal bud.
+
+    Parameters
+    ----------
+    heading : float64 (new trees, 3)
+        Direction of each new tree's metamer, a unit vector.
+    """
     for row in range(first_row, len(trees.tree_id)):
         sp = trees.species[row]
         s = trees.start[row]
@@ -371,7 +377,9 @@ def sprout(arena: Metamers, trees: Trees, first_row, traits: SpeciesTraits, year
         at, below, main, last = np.int64(0), np.int64(-1), np.bool_(True), np.uint8(255)
         draws = _draws(trees, row, np.int64(1), year.seed)
         draw = (draws[0, 0], draws[1, 0], draws[2, 0])
-        _add(arena, trees, row, at, below, main, 0.0, 0.0, 1.0, unit, at, traits, year, last, draw)
+        h = heading[row - first_row]
+        x, y, z = h[0], h[1], h[2]
+        _add(arena, trees, row, at, below, main, x, y, z, unit, at, traits, year, last, draw)
         arena.state[s] = TERMINAL | LATERAL
         arena.pipe[s] = traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent
         trees.size[row] = 1

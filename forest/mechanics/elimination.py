@@ -57,8 +57,8 @@ def _finite_turn(h, seat, beyond):  # type: ignore[no-untyped-def]
     """
     q = h[0] * h[0] + h[1] * h[1] + h[2] * h[2]
     if q < 0.04:
-        a = 0.5 - q / 24.0 * (1.0 - q / 30.0 * (1.0 - q / 56.0 * (1.0 - q / 90.0)))
-        b = (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * (1.0 - q / 110.0)))) / 6.0
+        a = 1 / 2 + q * (-1 / 24 + q * (1 / 720 + q * (-1 / 40320 + q * (1 / 3628800))))
+        b = 1 / 6 + q * (-1 / 120 + q * (1 / 5040 + q * (-1 / 362880 + q * (1 / 39916800))))
     else:
         angle = np.sqrt(q)
         a = (1.0 - np.cos(angle)) / q
@@ -170,9 +170,10 @@ def _eliminate(tree, work, i, stiff):  # type: ignore[no-untyped-def]
     seat = cross(f, h)
 
     # W and the elastic moment; the moment of the loads and what lies beyond
-    wh = np.float64(tree.rigidity[i, 0]) / length
-    wl = np.float64(tree.rigidity[i, 1]) / length
-    wu = np.float64(tree.rigidity[i, 2]) / length
+    per_length = 1.0 / length
+    wh = np.float64(tree.rigidity[i, 0]) * per_length
+    wl = np.float64(tree.rigidity[i, 1]) * per_length
+    wu = np.float64(tree.rigidity[i, 2]) * per_length
     rigid = (wu, 0.0, 0.0, wu, 0.0, wu)
     rigid = _plus(_plus(rigid, 0.5 * (wh - wu), _outer(h, h)), 0.5 * (wl - wu), _outer(c, c))
     strain = (

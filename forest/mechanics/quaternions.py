@@ -39,9 +39,9 @@ def unit(q):  # type: ignore[no-untyped-def]
 def turn(x, y, z):  # type: ignore[no-untyped-def]
     """The rotation about (x, y, z) by its length in rad (Taylor-Hell 2005, eq. 10)."""
     half = 0.25 * (x * x + y * y + z * z)
-    if half < 0.02:  # the next terms are below 1e-16
-        c = 1.0 - half / 2.0 * (1.0 - half / 12.0 * (1.0 - half / 30.0 * (1.0 - half / 56.0)))
-        s = 1.0 - half / 6.0 * (1.0 - half / 20.0 * (1.0 - half / 42.0 * (1.0 - half / 72.0)))
+    if half < 0.02:  # the next terms are below 1e-16; powers of half over factorials
+        c = 1.0 + half * (-1 / 2 + half * (1 / 24 + half * (-1 / 720 + half * (1 / 40320))))
+        s = 1.0 + half * (-1 / 6 + half * (1 / 120 + half * (-1 / 5040 + half * (1 / 362880))))
     else:
         angle = np.sqrt(half)
         c = np.cos(angle)

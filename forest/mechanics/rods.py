@@ -71,8 +71,8 @@ class Loads(NamedTuple):
 
 
 def allocate_rods(capacity: int) -> Rods:
-    """Make rods for `capacity` metamers; memory is touched only when it is used."""
-    return Rods(*(np.empty((capacity, k) if k > 1 else capacity, t) for t, k, _ in FIELDS.values()))
+    """Make rods of zeros for `capacity` metamers; memory is touched only when it is used."""
+    return Rods(*(np.zeros((capacity, k) if k > 1 else capacity, t) for t, k, _ in FIELDS.values()))
 
 
 @njit
@@ -82,7 +82,7 @@ def read4(field, i):  # type: ignore[no-untyped-def]
     x = np.float64(field[i, 1])
     y = np.float64(field[i, 2])
     z = np.float64(field[i, 3])
-    scale = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
     return w * scale, x * scale, y * scale, z * scale
 
 

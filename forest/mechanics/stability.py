@@ -184,9 +184,8 @@ def _measure_stem(stem, tip, row, species, sp, wind, force, moment, out):  # typ
         area = moment  # needed no longer
         for k in range(len(area)):
             area[k] = PROJECTION * stem.leaf_area[k]
-        wind_forces(
-            stem.leaf_height, area, wind.speed[row], wind.canopy_height, species.drag[sp], force
-        )
+        profile = (wind.canopy_height, wind.attenuation[row])
+        wind_forces(stem.leaf_height, area, wind.speed[row], profile, species.drag[sp], force)
         bending_moments(stem, tip, force, along_x, along_y, moment)
         stress, where = largest_stress(stem, moment)
     out.wind_stress_share[row] = stress / species.rupture[sp]
@@ -230,7 +229,7 @@ def measure_stability(first, step, arena, trees, shared, scratch, species, rigid
 
 def calm(n: int) -> Wind:
     """No wind over `n` trees."""
-    return Wind(np.zeros(n), 1.0, 0.0)
+    return Wind(np.zeros(n), 1.0, 0.0, np.zeros(n))
 
 
 def stability(

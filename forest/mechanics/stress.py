@@ -1,7 +1,8 @@
 """Bending stresses in a stem: under what hangs on it while it leans, and in the wind.
 
 The wind follows the usual profile of a closed stand: logarithmic above the canopy, exponential
-within it (Cionco 1965). Crowns give way as it grows (Mayhead 1973; Peltola et al. 1999).
+within it (Cionco 1965); the less so, the more open the stand is. Crowns give way as it grows
+(Mayhead 1973; Peltola et al. 1999).
 """
 
 from __future__ import annotations
@@ -36,22 +37,25 @@ class Wind(NamedTuple):
         m, more than 0.
     azimuth : float
         Direction towards which it blows, rad from x to y.
+    attenuation : float64 (trees,)
+        How fast it falls below the canopy's top around each tree; `ATTENUATION` in closed stands.
     """
 
     speed: NDArray[np.float64]
     canopy_height: float
     azimuth: float
+    attenuation: NDArray[np.float64]
 
 
 @njit
-def wind_profile(height, canopy_height):  # type: ignore[no-untyped-def]
+def wind_profile(height, canopy_height, attenuation):  # type: ignore[no-untyped-def]
     """Wind at a height as a share of that at the canopy's top.
 
     ln((z - d) / z0) / ln((h - d) / z0) above the top, exp(-a (1 - z / h)) below it.
     """
     relative = height / canopy_height
     if relative < 1.0:
-        return np.exp(-ATTENUATION * (1.0 - relative))
+        return np.exp(-attenuation * (1.0 - relative))
     above = np.log((relative - DISPLACEMENT) / ROUGHNESS)
     return above / np.log((1.0 - DISPLACEMENT) / ROUGHNESS)
 
@@ -67,7 +71,7 @@ def streamlining(speed):  # type: ignore[no-untyped-def]
 
 
 @njit
-def wind_forces(height, crown_area, speed, canopy_height, drag, force):  # type: ignore[no-untyped-def]
+def wind_forces(height, crown_area, speed, profile, drag, force):  # type: ignore[no-untyped-def]
     """Fill the force of the wind on the crown at each station, F = rho/2 C_d S(u) A u^2.
 
     Parameters
@@ -78,13 +82,16 @@ def wind_forces(height, crown_area, speed, canopy_height, drag, force):  # type:
         Their area projected against the wind, m2; leaves do not shelter each other here.
     speed : float
         Wind at the canopy's top, m/s.
-    canopy_height, drag : float
-        m; drag coefficient C_d.
+    profile : (float, float)
+        Height of the canopy's top, m; attenuation below it.
+    drag : float
+        Drag coefficient C_d.
     force : float64 (k,)
         Filled, N.
     """
+    canopy_height, attenuation = profile
     for k in range(len(height)):
-        u = speed * wind_profile(height[k], canopy_height)
+        u = speed * wind_profile(height[k], canopy_height, attenuation)
         force[k] = 0.5 * AIR_DENSITY * drag * streamlining(u) * crown_area[k] * u * u
 
 

@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.growth.dealing import deal
+from forest.growth.dealing import Deal, Workbench, deal
 from forest.mechanics.branch_points import reaction_rings
 from forest.mechanics.equilibrium import Bench, Settled, settle
 from forest.mechanics.loads import LoadSpecies, bury_sites, hang, make_loads
 from forest.mechanics.righting import BETA, NONE, STRAIN
 from forest.mechanics.rings import upright_azimuth
 from forest.mechanics.rods import Rods, allocate_rods, frame_new
+from forest.mechanics.shelter import Plot, sheltered, silhouettes, upwind_depth
 from forest.mechanics.stability import Stability, stability
 from forest.mechanics.stems import NO_RIGIDITY, StemSpecies
 from forest.mechanics.stress import Wind
+from forest.mechanics.wind_growth import feel_wind
 from forest.mechanics.wood import lay_wood, wood_traits
 from forest.species import Species
 from forest.trees.metamers import Arena, Metamers
@@ -30,6 +32,8 @@ from forest.trees.table import Trees
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+#: The canopy's top: this quantile of the trees' heights.
+_CANOPY_TOP = 0.9
 _RIGHTING = {"none": NONE, "beta": BETA, "strain": STRAIN}
 
 
@@ -40,6 +44,7 @@ class MechanicsSpec(NamedTuple):
     righting: str
     tolerance_rad: float
     wind_m_s: float
+    wind_growth: bool
 
 
 class Mechanics:
@@ -51,6 +56,8 @@ class Mechanics:
     species : sequence of Species
     pipe_exponent : float64 (species,)
         n of the run: diameter = pipe^(1/n).
+    plot : Plot
+        Where the wind blows.
 
     Attributes
     ----------
@@ -63,12 +70,21 @@ class Mechanics:
     """
 
     def __init__(
-        self, spec: MechanicsSpec, species: Sequence[Species], pipe_exponent: NDArray[np.float64]
+        self,
+        spec: MechanicsSpec,
+        species: Sequence[Species],
+        pipe_exponent: NDArray[np.float64],
+        plot: Plot,
     ) -> None:
         self._spec = spec
+        self._plot = plot
         self._woods = wood_traits(species, pipe_exponent)
         self._load_species = LoadSpecies.of(species, pipe_exponent)
         self._stems = _stem_species(species, pipe_exponent)
+        share = np.array([s.mechanics.wind_stress_limit for s in species], np.float64)
+        self._wind_limit = share * self._stems.rupture
+        self._wind_need = np.zeros(0, np.float32)
+        self._workbench = Workbench()
         self._tropism, self._stiffness = _tropism(species)
         self._bench = Bench()
         self._loads = make_loads(0)
@@ -98,17 +114,23 @@ class Mechanics:
         frame_new(metamers, trees, shared, rods, step, self._tropism, self._stiffness)
         righting = _RIGHTING[self._spec.righting]
         lay_wood(metamers, trees, shared, rods, self._woods, righting, self.ring)
+        self.settle(arena, trees)
+        bury_sites(metamers, trees, shared)
+
+    def settle(self, arena: Arena, trees: Trees) -> None:
+        """Bring all trees to rest under summer's load."""
+        metamers = arena.metamers
+        shared = deal(trees.size)
         hang(metamers, trees, shared, self._load_species, self._loads)
         self.settled = settle(
             metamers,
             trees,
             shared,
-            rods,
+            arena.companions,
             self._loads,
             self._bench.work(shared),
             tolerance=self._spec.tolerance_rad,
         )
-        bury_sites(metamers, trees, shared)
 
     def winter(self, arena: Arena, trees: Trees, row: int) -> tuple[Metamers, Trees]:
         """Give one tree as it stands in winter, without fruit and what leaves fall.
@@ -157,12 +179,40 @@ class Mechanics:
             azimuth = upright_azimuth(arena.companions.frame[index], azimuth)
         return eccentricity, np.where(eccentricity > 0.0, azimuth, np.nan)
 
-    def stability(self, arena: Arena, trees: Trees, canopy_height_m: float) -> Stability:
+    @property
+    def wind_growth(self) -> bool:
+        """Whether the wind feeds back on growth."""
+        return self._spec.wind_growth
+
+    def feel_wind(self, arena: Arena, trees: Trees, shared: Deal) -> NDArray[np.float32]:
+        """Find the d^2 that each metamer needs in the usual wind, m2 (capacity of the arena,)."""
+        if len(self._wind_need) != arena.capacity:
+            self._wind_need = np.zeros(arena.capacity, np.float32)
+        feel_wind(
+            arena.metamers,
+            trees,
+            shared,
+            self._workbench.scratch(shared),
+            self._stems,
+            self._wind_limit,
+            self._wind(arena, trees),
+            self._wind_need,
+        )
+        return self._wind_need
+
+    def stability(self, arena: Arena, trees: Trees) -> Stability:
         """Measure how safely the trees stand, in still air and in the scenario's wind."""
         rigidity = arena.companions.rigidity if self._spec.bending else NO_RIGIDITY
-        n = len(trees.tree_id)
-        wind = Wind(np.full(n, self._spec.wind_m_s), max(canopy_height_m, 0.1), 0.0)
+        wind = self._wind(arena, trees) if self._spec.wind_m_s > 0.0 else None
         return stability(arena.metamers, trees, self._stems, wind, rigidity)
+
+    def _wind(self, arena: Arena, trees: Trees) -> Wind:
+        """The usual wind as it comes to each tree past those upwind."""
+        seen = silhouettes(arena.metamers, trees, self._stems.leaf_area)
+        tall = seen.height[seen.height > 0.0]
+        canopy_height = float(np.quantile(tall, _CANOPY_TOP)) if len(tall) else 0.0
+        share, attenuation = sheltered(upwind_depth(trees.x, trees.y, seen, self._plot))
+        return Wind(self._spec.wind_m_s * share, max(canopy_height, 0.1), 0.0, attenuation)
 
 
 def _tropism(species: Sequence[Species]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -172,7 +222,7 @@ def _tropism(species: Sequence[Species]) -> tuple[NDArray[np.float64], NDArray[n
     for k, s in enumerate(species):
         modulus = 1e9 * s.mechanics.modulus_juvenile_gpa
         area_moment = np.pi / 64.0 * s.wood.twig_diameter_m**4
-        tropism[k, 2] = s.mechanics.tropic_force_n * s.architecture.internode_length_m
+        tropism[k, 2] = s.mechanics.tropic_torque_nm
         stiffness[k] = modulus * area_moment
         stiffness[k, 0] *= 2.0 * s.mechanics.shear_ratio
     return tropism, stiffness

@@ -96,8 +96,23 @@ class Mechanics(Table):
         1e-4, "turn of a metamer that may be left to equilibrium", unit="rad", ge=1e-9, le=0.1
     )
     wind_m_s: float = quantity(
-        0.0, "wind at the canopy's top for which stresses are told", unit="m/s", ge=0, le=100
+        0.0,
+        "usual mean wind of a storm at the top of an open canopy, for which stresses are told",
+        unit="m/s",
+        ge=0,
+        le=100,
     )
+    wind_growth: bool = quantity(
+        False,
+        "stems that this wind stresses beyond wind_stress_limit thicken first and grow less long",
+        unit="",
+    )
+
+    @model_validator(mode="after")
+    def _wind_blows(self) -> Mechanics:
+        if self.wind_growth and self.wind_m_s == 0.0:
+            raise Refusal("wind_growth needs a wind", key="wind_m_s", expected="above 0, m/s")
+        return self
 
 
 class Shadow(Table):
@@ -256,6 +271,12 @@ class PlantedTree(Table):
     y_m: float = quantity(..., "position along y", unit="m", ge=0, le=10000)
     species: str = quantity(
         "", "a species of the scenario; may be left out where there is one", unit=""
+    )
+    lean_deg: float = quantity(
+        0.0, "angle between the seedling's stem and the vertical", unit="degree", ge=0, le=85
+    )
+    lean_azimuth_deg: float = quantity(
+        0.0, "direction towards which it leans, from x to y", unit="degree", ge=-360, le=360
     )
 
 

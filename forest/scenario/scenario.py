@@ -165,6 +165,16 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
+    def _wind_has_a_price(self) -> Scenario:
+        if self.mode == "paper" and self.mechanics is not None and self.mechanics.wind_growth:
+            raise Refusal(
+                "wind_growth shifts dry mass, and paper mode has none",
+                key="mechanics.wind_growth",
+                expected='mode = "mass_balance"',
+            )
+        return self
+
+    @model_validator(mode="after")
     def _picture_fits(self) -> Scenario:
         rendered = self.environment.rendered
         if rendered is None:
@@ -327,6 +337,22 @@ class Scenario(Table):
             raise TypeError(planting)
         shares = [use.share for use in self.species.values()]
         return x, y, placing.draw_species(shares, len(x), self.seed)
+
+    def planting_leans(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Tell how the trees of the first year lean when they are planted.
+
+        Returns
+        -------
+        lean_deg, azimuth_deg : float64 arrays
+            Angle to the vertical, and direction from x to y; one per tree of
+            `planting_positions`. Only trees that are planted one by one lean.
+        """
+        if isinstance(self.planting, Explicit):
+            trees = self.planting.trees
+            lean = np.array([tree.lean_deg for tree in trees])
+            return lean, np.array([tree.lean_azimuth_deg for tree in trees])
+        upright = np.zeros(self._count_trees())
+        return upright, upright
 
     def with_overrides(self, overrides: Iterable[str]) -> Scenario:
         """Change keys and check the whole again, files included.

@@ -38,12 +38,22 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("mode", scenario.mode),
         ("environment", " + ".join(parts)),
         ("bud fate", scenario.growth.bud_fate),
+        ("mechanics", _mechanics(scenario)),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
         ("acts", _acts(scenario)),
         ("seed", str(scenario.seed)),
         ("tables", ", ".join(scenario.output.tables) or "none"),
         ("sha256", scenario.digest()),
     ]
+
+
+def _mechanics(scenario: Scenario) -> str:
+    mechanics = scenario.mechanics
+    if mechanics is None:
+        return "none"
+    how = f"bending, righting {mechanics.righting}" if mechanics.bending else "stability alone"
+    answered = ", answered by growth" if mechanics.wind_growth else ""
+    return f"{how}, wind {mechanics.wind_m_s:g} m/s{answered}"
 
 
 def _acts(scenario: Scenario) -> str:

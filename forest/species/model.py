@@ -281,11 +281,19 @@ class Mechanics(Table):
     drag_coefficient: float = quantity(
         0.3, "drag of the crown per frontal area, before leaves stream with the wind", ge=0, le=2
     )
-    tropic_force_n: float = quantity(
+    wind_stress_limit: float = quantity(
+        0.05,
+        "stress in the usual wind, as a share of rupture_mpa, beyond which a stem thickens first "
+        "and spends less on length (wind_growth)",
+        gt=0,
+        le=1,
+    )
+    tropic_torque_nm: float = quantity(
         0.0,
-        "force that turns a new metamer upwards (F_tropic, eq. 4); 0 = off",
-        unit="N",
-        ge=0,
+        "torque that turns a level new metamer upwards, below 0 downwards (F_tropic with the unit "
+        "heading, Taylor-Hell 2005, eqs 4 and 6); 0 = off",
+        unit="N m",
+        ge=-100,
         le=100,
     )
     stem_angle_deg: float = quantity(

@@ -31,6 +31,7 @@ COLUMNS: dict[str, tuple[type, int, str]] = {
     "next_serial": (np.int32, 1, "serial number of its next metamer"),
     "vigour": (np.float32, 1, "lasting factor on its production"),
     "reserve": (np.float64, 1, "stored dry mass, kg"),
+    "wind_stress": (np.float32, 1, "stress at the stem's foot in last year's wind per its limit"),
     "bad_years": (np.int32, 1, "years in a row of a net income below the limit"),
     "breast_serial": (np.int32, 1, "serial of the metamer at 1.3 m; -1 while there is none"),
     "disc_serial": (np.int32, DISCS, "serials of the metamers whose rings are told; -1 for none"),
@@ -54,6 +55,7 @@ class Trees(NamedTuple):
     next_serial: NDArray[np.int32]
     vigour: NDArray[np.float32]
     reserve: NDArray[np.float64]
+    wind_stress: NDArray[np.float32]
     bad_years: NDArray[np.int32]
     breast_serial: NDArray[np.int32]
     disc_serial: NDArray[np.int32]

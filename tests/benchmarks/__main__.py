@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.benchmarks import costs, machine, report, runs, stands
+from tests.benchmarks import bending, costs, machine, report, runs, stands
 
 
 class Extent(NamedTuple):
@@ -24,12 +24,19 @@ class Extent(NamedTuple):
 
     across: tuple[int, ...]  # tiles along each edge of the stands, of about 40,000 metamers each
     rounds: tuple[int, ...]  # of each stand
+    bending: tuple[int, int]  # tiles along each edge and rounds of the stand that bends
     run: tuple[str, ...]  # changes to the hectare
     repeats: int  # of the paper's tree and of the warm start
 
 
-FULL = Extent(across=(2, 5, 17), rounds=(9, 5, 3), run=(), repeats=3)
-QUICK = Extent(across=(1, 3), rounds=(5, 3), run=("plot.size_m=[24, 24]", "years=30"), repeats=1)
+FULL = Extent(across=(2, 5, 17), rounds=(9, 5, 3), bending=(5, 3), run=(), repeats=3)
+QUICK = Extent(
+    across=(1, 3),
+    rounds=(5, 3),
+    bending=(3, 3),
+    run=("plot.size_m=[24, 24]", "years=30"),
+    repeats=1,
+)
 
 
 def measure(extent: Extent) -> dict[str, Any]:
@@ -43,6 +50,10 @@ def measure(extent: Extent) -> dict[str, Any]:
             _say(f"{n} x {n} tiles", machine.alone, costs.measure_stand, tile, n, rounds)
             for n, rounds in zip(extent.across, extent.rounds, strict=True)
         ]
+        _say("growing a tile that bends", machine.alone, stands.keep_tile, tile, "mechanics={}")
+        result["bending"] = _say(
+            "mechanics", machine.alone, bending.measure_bending, tile, *extent.bending
+        )
     result["exponent"] = {
         threads: costs.exponent(result["stands"], threads)
         for threads in result["stands"][0]["threads"]

@@ -31,6 +31,7 @@ def lines(result: dict[str, Any]) -> Iterator[Line]:
     """Give the table row by row."""
     for stand in result["stands"]:
         yield from _stand_lines(stand)
+    yield from _bending_lines(result["bending"])
     yield Line("All stands", ())
     for threads, exponent in result["exponent"].items():
         what = f"exponent of a year's time over metamers, threads: {threads}"
@@ -86,6 +87,34 @@ _MEMORY = {
     "process_bytes": "process, resident bytes per metamer",
     "peak_bytes": "process at its peak, bytes per metamer",
 }
+
+
+def _bending_lines(bending: dict[str, Any]) -> Iterator[Line]:
+    one, most = min(bending["threads"]), max(bending["threads"])
+    alone, timed = bending["threads"][one], bending["threads"][most]
+    yield Line(
+        f"A stand that bends: {bending['metamers']:,} metamers; {most} threads; "
+        "ns per metamer-year",
+        (),
+    )
+    for part, wall in timed["wall_ns"].items():
+        cpu, single = timed["cpu_ns"][part], alone["wall_ns"][part]
+        cells = (f"{wall:.1f}", f"{cpu:.1f}", f"{single:.1f}", f"{single / wall:.2f}")
+        yield Line(part, cells)
+    bend, single = timed["bend_ns"], alone["bend_ns"]
+    cells = (f"{bend:.1f}", f"{timed['bend_cpu_ns']:.1f}", f"{single:.1f}", f"{single / bend:.2f}")
+    yield Line("whole bending, without stability", cells)
+    again = (f"{timed['again_ns']:.1f}", "", f"{alone['again_ns']:.1f}")
+    yield Line("settling where nothing has changed", again)
+    year = (f"{timed['year_ns']:.1f}", "", f"{alone['year_ns']:.1f}")
+    yield Line("whole year", year)
+    ratio = (f"{timed['year_ratio']:.2f}", "", f"{alone['year_ratio']:.2f}")
+    yield Line("whole year over that without mechanics", ratio)
+    passes = (f"{bending['passes']:.2f}", f"{bending['most_passes']}")
+    yield Line("passes of a tree, mean and most", passes)
+    picture = (f"{timed['picture_ns']:.1f}", "", f"{alone['picture_ns']:.1f}")
+    yield Line("rendered light, ns per metamer and direction", picture)
+    yield Line("same bits on 1 and 2 threads", ("yes" if bending["same_bits"] else "NO",))
 
 
 def _run_lines(result: dict[str, Any]) -> Iterator[Line]:

@@ -72,9 +72,10 @@ def on_square(scenario: Scenario, edge_m: float) -> Scenario:
     return scenario.with_overrides([f"plot.size_m=[{edge_m:g}, {edge_m:g}]"])
 
 
-def grow_tile(*, edge_m: float = TILE_M, years: int = TILE_YEARS) -> Saved:
-    """Grow the hectare's stand on a small periodic plot."""
+def grow_tile(*changes: str, edge_m: float = TILE_M, years: int = TILE_YEARS) -> Saved:
+    """Grow the hectare's stand, changed as `--set` would, on a small periodic plot."""
     scenario = on_square(Scenario.load(SCENARIOS / "hectare.toml"), edge_m)
+    scenario = scenario.with_overrides(changes)
     stand = Stand(scenario)
     for _ in range(years):
         stand.step()
@@ -132,9 +133,9 @@ def save(saved: Saved, path: Path) -> None:
     np.savez(path, _meta=meta, **saved.arrays)
 
 
-def keep_tile(path: str) -> None:
+def keep_tile(path: str, *changes: str) -> None:
     """Grow a tile and save it."""
-    save(grow_tile(), Path(path))
+    save(grow_tile(*changes), Path(path))
 
 
 def load(path: Path) -> Saved:

@@ -46,6 +46,13 @@ def verdicts(result: dict[str, Any]) -> Iterator[Verdict]:
     yield Verdict("exponent of cost", max(result["exponent"].values()), "≤", 1.05)
     if "gain" in large:
         yield Verdict("2 threads over 1", large["gain"]["year"], "≥", 1.4)
+    bending = result["bending"]
+    timed = bending["threads"][max(bending["threads"])]
+    # ns per metamer are ms per million
+    yield Verdict("a year's bending, s per million metamers", timed["bend_ns"] / 1e3, "≤", 1.0)
+    yield Verdict("the same, aim", timed["bend_ns"] / 1e3, "≤", 0.6)
+    changed = timed["again_ns"] / timed["wall_ns"]["settle"]
+    yield Verdict("settling where nothing has changed, of a year's", changed, "≤", 0.5)
     yield Verdict("share of writing", run["writing_share"], "≤", 0.10)
     yield Verdict("cold start, s", starts["cold_s"], "≤", 45.0)
     yield Verdict("warm start, s", starts["warm_s"], "≤", 2.0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from forest.trees.metamers import BYTES_PER_METAMER, FIELDS
+from tests.benchmarks.bending import measure_bending
 from tests.benchmarks.costs import exponent
 from tests.benchmarks.stands import (
     ClockedStand,
@@ -76,3 +77,14 @@ def test_exponent_of_a_known_power() -> None:
         for n in (10**5, 10**6, 10**7)
     ]
     assert exponent(stands, "1") == pytest.approx(1.1)
+
+
+def test_parts_of_mechanics_lie_within_its_phase(tmp_path: Path) -> None:
+    save(grow_tile("mechanics={}", edge_m=6.0, years=4), tmp_path / "tile.npz")
+    found = measure_bending(str(tmp_path / "tile.npz"), 2, 1)
+    assert found["same_bits"]
+    assert 1.0 <= found["passes"] <= found["most_passes"]
+    for timed in found["threads"].values():
+        parts = [ns for part, ns in timed["wall_ns"].items() if part != "stability"]
+        assert 0.0 < sum(parts) <= timed["bend_ns"] < timed["year_ns"]
+        assert min(timed["again_ns"], timed["picture_ns"], timed["year_ratio"]) > 0.0

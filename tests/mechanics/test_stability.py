@@ -114,7 +114,7 @@ def _same(one: Stability, other: Stability) -> None:
 
 def test_threads_give_the_same_bits() -> None:
     m, trees = woody_arena(np.random.default_rng(5), 40, 40)
-    wind = Wind(np.full(40, 15.0), 4.0, 0.3)
+    wind = Wind(np.full(40, 15.0), 4.0, 0.3, np.full(40, 2.0))
     with using_threads(1):
         one = stability(m, trees, SPECIES, wind)
     with using_threads(3):

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from forest.mechanics.stability import stability
 from forest.mechanics.stems import GRAVITY, Stem, read_stem
 from forest.mechanics.stress import (
+    ATTENUATION,
     Wind,
     bending_moments,
     largest_stress,
@@ -90,11 +91,14 @@ def test_stress_of_a_force_at_the_top() -> None:
 
 
 def test_wind_profile() -> None:
-    assert wind_profile(20.0, 20.0) == pytest.approx(1.0)
-    assert wind_profile(10.0, 20.0) == pytest.approx(np.exp(-1.0))
+    assert wind_profile(20.0, 20.0, ATTENUATION) == pytest.approx(1.0)
+    assert wind_profile(10.0, 20.0, ATTENUATION) == pytest.approx(np.exp(-1.0))
+    assert wind_profile(10.0, 20.0, 0.0) == 1.0
     doubled = np.log((2.0 - 2.0 / 3.0) / 0.1) / np.log((1.0 / 3.0) / 0.1)
-    assert wind_profile(40.0, 20.0) == pytest.approx(doubled)
-    assert wind_profile(20.0 - 1e-6, 20.0) == pytest.approx(wind_profile(20.0 + 1e-6, 20.0))
+    assert wind_profile(40.0, 20.0, ATTENUATION) == pytest.approx(doubled)
+    assert wind_profile(20.0 - 1e-6, 20.0, ATTENUATION) == pytest.approx(
+        wind_profile(20.0 + 1e-6, 20.0, ATTENUATION)
+    )
 
 
 def test_crowns_give_way() -> None:
@@ -109,11 +113,12 @@ def test_wind_forces(seed: int) -> None:
     height = rng.uniform(0.0, 30.0, 7)
     area = rng.uniform(0.0, 3.0, 7)
     speed, canopy, drag = rng.uniform(1.0, 30.0), rng.uniform(5.0, 25.0), rng.uniform(0.2, 0.5)
+    fall = rng.uniform(0.0, 3.0)
     force = np.empty(7)
-    wind_forces(height, area, speed, canopy, drag, force)
+    wind_forces(height, area, speed, (canopy, fall), drag, force)
     for k in range(7):
         if height[k] < canopy:
-            u = speed * np.exp(-2.0 * (1.0 - height[k] / canopy))
+            u = speed * np.exp(-fall * (1.0 - height[k] / canopy))
         else:
             u = speed * np.log((height[k] / canopy - 2 / 3) / 0.1) / np.log(10 / 3)
         s = 0.4 if u > 20.0 else 10.0 / u - 0.1 if u > 11.0 else 10.0 / 11.0 - 0.1
@@ -124,15 +129,16 @@ def test_wind_bends_trees() -> None:
     """More wind, more stress; from another side a leaning tree is bent otherwise."""
     m, trees = pole(tapered(40, 1.0, 0.1), 12.0, lean=0.1)
     m.state[20:40] |= TERMINAL
+    closed = np.array([ATTENUATION])
     calm = stability(m, trees, SPECIES)
-    with_lean = stability(m, trees, SPECIES, Wind(np.array([12.0]), 12.0, 0.0))
-    against = stability(m, trees, SPECIES, Wind(np.array([12.0]), 12.0, np.pi))
+    with_lean = stability(m, trees, SPECIES, Wind(np.array([12.0]), 12.0, 0.0, closed))
+    against = stability(m, trees, SPECIES, Wind(np.array([12.0]), 12.0, np.pi, closed))
     np.testing.assert_array_equal(with_lean.stress_share, calm.stress_share)
     np.testing.assert_array_equal(calm.wind_stress_share, calm.stress_share)
     assert with_lean.wind_stress_share[0] > calm.stress_share[0]
     assert with_lean.base_moment_nm[0] > against.base_moment_nm[0]
     stem = read_stem(m, trees, 0, SPECIES)
     force = np.empty(40)
-    wind_forces(stem.leaf_height, 0.5 * stem.leaf_area, 12.0, 12.0, 0.35, force)
+    wind_forces(stem.leaf_height, 0.5 * stem.leaf_area, 12.0, (12.0, ATTENUATION), 0.35, force)
     pushed = calm.base_moment_nm[0] + force @ stem.leaf_height
     assert with_lean.base_moment_nm[0] == pytest.approx(pushed, rel=1e-5)

@@ -87,6 +87,20 @@ def test_explicit_keeps_places_and_wraps_the_edge_of_a_torus() -> None:
     assert (x.tolist(), y.tolist()) == ([20, 1.25], [3, 10])
 
 
+def test_only_trees_planted_one_by_one_lean() -> None:
+    trees = [
+        {"x_m": 1, "y_m": 3, "species": "picea_abies", "lean_deg": 30, "lean_azimuth_deg": 90},
+        {"x_m": 2, "y_m": 3, "species": "picea_abies"},
+    ]
+    lean, azimuth = planted({"kind": "explicit", "trees": trees}).planting_leans()
+    assert (lean.tolist(), azimuth.tolist()) == ([30, 0], [90, 0])
+    rows = planted({"kind": "regular", "spacing_m": [4, 5]})
+    assert rows.planting_leans()[0].tolist() == [0.0] * len(rows.planting_positions()[0])
+    trees[0]["lean_deg"] = 90
+    with pytest.raises(InputError, match=r"trees\[0\].lean_deg"):
+        planted({"kind": "explicit", "trees": trees})
+
+
 @pytest.mark.parametrize(
     ("planting", "message"),
     [

@@ -232,3 +232,17 @@ def test_text_that_is_not_utf8(tmp_path: Path) -> None:
     (tmp_path / "stand.toml").write_bytes(b"\xff\x00\x80")
     with pytest.raises(InputError, match="not UTF-8"):
         Scenario.load(tmp_path / "stand.toml")
+
+
+@pytest.mark.parametrize(
+    ("mechanics", "parts"),
+    [
+        ("wind_growth=true", ["mechanics.wind_m_s", "above 0"]),
+        ("wind_m_s=9, wind_growth=true", ["mechanics.wind_growth", 'mode = "mass_balance"']),
+    ],
+)
+def test_wind_growth_needs_wind_and_dry_mass(
+    tmp_path: Path, mechanics: str, parts: list[str]
+) -> None:
+    message = refused(tmp_path, f'mode = "paper"\nmechanics = {{ {mechanics} }}\n{TEXT}')
+    assert all(part in message for part in parts)
