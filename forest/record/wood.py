@@ -181,11 +181,7 @@ def _rings(run: Run, tree_id: int, height_m: float, year: int | None) -> StemRin
             where=str(run.path),
             expected=f"a year from {rings['year'].min()} to {last}",
         )
-    try:
-        return rings_at(upto, tree_id, height_m)
-    except InputError as error:
-        when = last if year is None else year
-        raise InputError(f"{error}, where it had rings in {when}", where=str(run.path)) from None
+    return rings_at(upto, tree_id, height_m)
 
 
 def _recorded_rings(run: Run, tree_id: int, height_m: float, year: int) -> StemRings | None:
