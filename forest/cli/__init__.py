@@ -17,6 +17,7 @@ from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
 from forest.cli.measuring import bucking, measure
 from forest.cli.reading import info, picture, stability, table
+from forest.cli.ringing import rings
 from forest.cli.shared import Stopped
 
 # The class of all wrong usage; which module holds it depends on typer's version.
@@ -38,8 +39,20 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (
-    run, sweep, check, table, stability, info, export, measure, bucking, species, picture, version,
-):  # fmt: skip
+    run,
+    sweep,
+    check,
+    table,
+    stability,
+    rings,
+    measure,
+    bucking,
+    info,
+    export,
+    species,
+    picture,
+    version,
+):
     app.command()(_command)
 
 

@@ -1,4 +1,4 @@
-"""Ring series: series from rings, increment cores, their files, and how well they cross-date."""
+"""Tree rings: dated series, increment cores, discs and sections, files, and cross-dating."""
 
 from __future__ import annotations
 
@@ -6,14 +6,22 @@ from forest.dendro.ages import ages
 from forest.dendro.campaign import campaign
 from forest.dendro.cores import Core, bore, core, radial_widths
 from forest.dendro.crossdating import interseries_correlation
+from forest.dendro.disc import Disc
+from forest.dendro.knots import Knot
+from forest.dendro.life import StemLife
 from forest.dendro.names import short_ids
+from forest.dendro.section import Section
 from forest.dendro.series import RingSeries, ring_series
 from forest.dendro.tucson import read_rwl, write_rwl
 from forest.dendro.wide_csv import read_csv, write_csv
 
 __all__ = [
     "Core",
+    "Disc",
+    "Knot",
     "RingSeries",
+    "Section",
+    "StemLife",
     "ages",
     "bore",
     "campaign",

@@ -131,7 +131,7 @@ def bore(stem: StemRings, azimuth_deg: float, aim_deg: float = 0.0) -> Core:
         within the last ring holds none.
     """
     mean, shift = _mean_and_shift(stem)
-    radius = np.concatenate(([0.0], np.cumsum(mean)))
+    radius = stem.undated_mm + np.concatenate(([0.0], np.cumsum(mean)))
     centre = np.vstack((np.zeros(2), np.cumsum(shift, axis=0)))
     inward, aim = math.radians(azimuth_deg), math.radians(aim_deg)
     to_bark = _exit(radius[-1:], centre[-1:], _direction(inward), 0.0)[0]
@@ -198,6 +198,15 @@ def core(
         If the tree or the height has no rings, the azimuth is not finite, or `aim_sd_deg` is out
         of its range.
     """
+    return take_core(
+        rings_at(rings, tree_id, stem_height_m), azimuth_deg, aim_sd_deg=aim_sd_deg, seed=seed
+    )
+
+
+def take_core(
+    stem: StemRings, azimuth_deg: float, *, aim_sd_deg: float = 0.0, seed: int = 1
+) -> Core:
+    """Take an increment core from a stem at a height; see `core`."""
     if not math.isfinite(azimuth_deg):
         raise InputError(f"azimuth {azimuth_deg:g}", where="core", expected="a number of degrees")
     if not 0.0 <= aim_sd_deg <= _LARGEST_AIM_SD_DEG:
@@ -206,10 +215,9 @@ def core(
             where="core",
             expected=f"0 to {_LARGEST_AIM_SD_DEG:g} degrees",
         )
-    stem = rings_at(rings, tree_id, stem_height_m)
-    height_mm = round(1000.0 * stem_height_m)
+    height_mm = round(1000.0 * stem.stem_height_m)
     tenths = round(10.0 * azimuth_deg) % 3600
-    draw, _ = normals(seed, STREAM_CORE, tree_id, height_mm, tenths)
+    draw, _ = normals(seed, STREAM_CORE, stem.tree_id, height_mm, tenths)
     return bore(stem, azimuth_deg, aim_sd_deg * min(max(float(draw), -3.0), 3.0))
 
 

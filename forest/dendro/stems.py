@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +43,8 @@ class StemRings(NamedTuple):
         0 to 1.
     thick_side_deg : float64 (n,)
         Azimuth of the thick side, degrees from x towards y; 0 where the ring has none.
+    undated_mm : float
+        Radius of the wood inside the innermost ring, mm, where it was not on record; else 0.
     """
 
     tree_id: int
@@ -52,6 +55,7 @@ class StemRings(NamedTuple):
     width_mm: NDArray[np.float64]
     eccentricity: NDArray[np.float64]
     thick_side_deg: NDArray[np.float64]
+    undated_mm: float = 0.0
 
 
 def stem_rings(rings: pd.DataFrame) -> list[StemRings]:
@@ -135,6 +139,8 @@ def rings_at(rings: pd.DataFrame, tree_id: int, stem_height_m: float) -> StemRin
 
 def at_height(rings: pd.DataFrame, stem_height_m: float) -> NDArray[np.bool_]:
     """Tell which rows are of a stem height, to the millimetre."""
+    if not math.isfinite(stem_height_m):
+        raise InputError(f"height {stem_height_m:g}", where="rings", expected="a number of metres")
     return np.asarray(_in_mm(rings) == round(1000.0 * stem_height_m))
 
 
@@ -164,4 +170,14 @@ def _one_stem(
     every = np.arange(place[-1] + 1)
     ages = age[first] + every
     ages[place] = age[first:]
-    return StemRings(tree_id, species, stem_height_m, year[first] + every, ages, *columns)
+    width, eccentricity, thick_side = columns
+    return StemRings(
+        tree_id,
+        species,
+        stem_height_m,
+        year[first] + every,
+        ages,
+        width,
+        eccentricity,
+        thick_side,
+    )

@@ -263,7 +263,7 @@ def stems_of_skeletons(skeletons: Sequence[Skeleton], bark_factor: ArrayLike) ->
     bark_factor : float or (n,)
         Double bark thickness per diameter over bark.
     """
-    paths = [_path(skeleton) for skeleton in skeletons]
+    paths = [stem_path(skeleton) for skeleton in skeletons]
     of = list(zip(skeletons, paths, strict=True))
     empty = [np.empty(0)]
     return _stems(
@@ -276,8 +276,8 @@ def stems_of_skeletons(skeletons: Sequence[Skeleton], bark_factor: ArrayLike) ->
     )
 
 
-def _path(skeleton: Skeleton) -> NDArray[np.int32]:
-    """List the internodes of a skeleton's stem, from the base up."""
+def stem_path(skeleton: Skeleton) -> NDArray[np.int32]:
+    """List the internodes of a skeleton's stem, from the base up; see `stems_of_skeletons`."""
     parent = skeleton.parent
     main = (parent >= 0) & (skeleton.axis == skeleton.axis[parent])
     # of the children of one parent, the best stands first

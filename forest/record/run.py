@@ -20,7 +20,12 @@ from forest.trees.skeleton import Skeleton, number_axes
 
 if TYPE_CHECKING:
     import pandas as pd
+    from numpy.typing import ArrayLike
 
+    from forest.dendro.cores import Core
+    from forest.dendro.disc import Disc
+    from forest.dendro.life import StemLife
+    from forest.dendro.section import Section
     from forest.scenario import Scenario
 
 
@@ -242,6 +247,73 @@ class Run:
         living = np.diff(steps["radii"][:], prepend=0) > 0
         living_years: NDArray[np.int32] = years[living & np.isin(years, self.years)]
         return living_years
+
+    def sample_group(self, tree_id: int) -> h5py.Group:
+        """Give the group that holds a sample tree's life."""
+        return self._file[f"samples/{tree_id}"]
+
+    def disc(self, tree_id: int, height_m: float, *, year: int | None = None) -> Disc:
+        """Cut a disc out of a stem.
+
+        Parameters
+        ----------
+        tree_id : int
+            A tree that lived.
+        height_m : float
+            Height of the disc above the ground: of a sample tree any up to its top, of another
+            one at which `/rings` has its rings. Only a sample tree's disc shows knots.
+        year : int, optional
+            Calendar year at whose end it is cut; the tree's last year if not given.
+
+        Raises
+        ------
+        InputError
+            If the tree, the year or the height is not on record.
+        """
+        from forest.record import wood
+
+        return wood.disc(self, tree_id, height_m, year)
+
+    def section(
+        self, tree_id: int, origin: ArrayLike, normal: ArrayLike, *, year: int | None = None
+    ) -> Section:
+        """Cut the stem of a sample tree by a plane through `origin` (m), square to `normal`.
+
+        Raises
+        ------
+        InputError
+            If the tree or the year is not on record, or the plane misses the stem.
+        """
+        from forest.record import wood
+
+        return wood.section(self, tree_id, origin, normal, year)
+
+    def core(
+        self,
+        tree_id: int,
+        height_m: float,
+        azimuth_deg: float,
+        *,
+        year: int | None = None,
+        aim_sd_deg: float = 0.0,
+        seed: int = 1,
+    ) -> Core:
+        """Take an increment core, where `disc` would cut; see `forest.dendro.core`."""
+        from forest.record import wood
+
+        return wood.core(self, tree_id, height_m, azimuth_deg, year, aim_sd_deg, seed)
+
+    def stem(self, tree_id: int, *, year: int | None = None) -> StemLife:
+        """Give the stem of a sample tree with the surfaces of all its years on record.
+
+        Raises
+        ------
+        InputError
+            If the tree or the year is not on record.
+        """
+        from forest.record import wood
+
+        return wood.stem_life(self, tree_id, year)
 
     def close(self) -> None:
         """Close the file; tables already read stay."""

@@ -22,6 +22,7 @@ weather = { noise_sd = 0.3 }
 environment = { shadow = {}, canopy = {} }
 species = { pinus_sylvestris = {}, fagus_sylvatica = {} }
 planting = { kind = "random", density_ha = 1900 }
+output = { sample_trees = { ids = [1] } }
 """
 
 
