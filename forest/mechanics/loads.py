@@ -74,11 +74,13 @@ def _hang_chunks(first, step, arena, trees, shared, species, weight):  # type: i
 @driver
 def _bury_chunks(first, step, arena, trees, shared, solid, voxel_m):  # type: ignore[no-untyped-def]
     bare = np.uint8(255 - TERMINAL - LATERAL)
+    obstructed = solid.mask.size > 1  # asked once: the slice of a tip costs more than the question
     for b in range(first, BINS, step):
         for k in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[k]
             for i in range(trees.start[row], trees.start[row] + trees.size[row]):
-                if arena.tip[i, 2] < 0.0 or inside(solid, trees, row, arena.tip[i], voxel_m):
+                below = arena.tip[i, 2] < 0.0
+                if below or (obstructed and inside(solid, trees, row, arena.tip[i], voxel_m)):
                     arena.state[i] &= bare
 
 
