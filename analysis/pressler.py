@@ -131,7 +131,7 @@ def study(run: Run) -> Study:
     enough(every, f"tree with {FEWEST_DISCS} discs below its crown", run)
     figure, ((left, right),) = panels(2, size=(4.4, 4.2))
     breast = every[every["stem_height_m"] == BREAST_M].set_index("tree_id")
-    for tree_id, tree in every.groupby("tree_id"):
+    for tree_id, tree in every[every["tree_id"].isin(breast.index)].groupby("tree_id"):
         colour = look_of(tree["species"].iloc[0]).line
         at = tree["stem_height_m"] / tree["crown_base_m"]
         for axes, name in ((left, "width_mm"), (right, "area_cm2")):
@@ -139,7 +139,7 @@ def study(run: Run) -> Study:
                 tree[name] / breast.loc[tree_id, name], at, "o-", ms=3, lw=0.5, color=colour,
                 alpha=0.5,
             )  # fmt: skip
-    for tree_id in set(run.samples) & set(every["tree_id"]):
+    for tree_id in set(run.samples) & set(breast.index):
         if int(run.years[-1]) - YEARS not in run.sample_years(tree_id):
             continue
         of = internodes(run, tree_id)

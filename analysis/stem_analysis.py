@@ -20,6 +20,7 @@ sys.path.insert(0, str(ROOT))
 
 from analysis.common import Study, enough, panels, plain, script  # noqa: E402
 from forest.dendro import ages  # noqa: E402
+from forest.errors import InputError  # noqa: E402
 from forest.measure.stem import stems_of_skeletons  # noqa: E402
 from forest.measure.taper import disc_diameters  # noqa: E402
 from forest.record.run import Run  # noqa: E402
@@ -123,6 +124,10 @@ def study(run: Run) -> Study:
     left.legend(frameon=False, fontsize=8)
     long = [i for i in chosen if len(run.sample_years(i)) > _OUTLINE_EVERY]
     of_outline = first.loc[long] if long else first
+    if of_outline["dbh_cm"].isna().all():
+        raise InputError(
+            "has no tree that reaches 1.3 m", where=str(run.path), expected="an older stand"
+        )
     thickest = int(of_outline["dbh_cm"].idxmax())
     for year, (radius, height) in outlines(run, thickest).items():
         colour = "k" if year == last else "0.55"

@@ -81,12 +81,20 @@ def rings(
         elif suffix in _SERIES:
             _write_series(_cores(run, tree, at, year, azimuth or _OPPOSITE), to, force)
         elif suffix == ".vtp":
+            from forest.record.export import whole_file
             from forest.view.trunk_mesh import write_trunk
 
-            cells = write_trunk(run.stem(tree, year=year), to, height_m=height)
+            life = run.stem(tree, year=year)
+            with whole_file(to, overwrite=force) as draft:
+                cells = write_trunk(life, draft, height_m=height)
             typer.echo(f"{to}: {cells:,} cells, tree {tree}")
+            if len(life.years) == 1:
+                typer.echo(
+                    f"tree {tree} is on record in {life.years[0]} only, so all wood has that year; "
+                    "name it in output.sample_trees.ids to have its rings"
+                )
         else:
-            _draw(run, tree, at, year, to)
+            _draw(run, tree, at, year, to, force)
 
 
 def _checked(to: Path, force: bool) -> str:
@@ -107,12 +115,14 @@ def _checked(to: Path, force: bool) -> str:
     return suffix
 
 
-def _draw(run: Any, tree: int, height: float, year: int | None, to: Path) -> None:
+def _draw(run: Any, tree: int, height: float, year: int | None, to: Path, force: bool) -> None:
+    from forest.record.export import whole_file
     from forest.view.disc_picture import draw_disc
 
     disc = run.disc(tree, height, year=year)
     groups = {species.name: species.group for species in run.scenario.species_list}
-    draw_disc(disc, to, conifer=groups[disc.species] == "conifer")
+    with whole_file(to, overwrite=force) as draft:
+        draw_disc(disc, draft, conifer=groups[disc.species] == "conifer")
     typer.echo(f"{to}: {len(disc.years)} rings of tree {tree}, {disc.years[0]} to {disc.years[-1]}")
 
 

@@ -13,8 +13,9 @@ def relative_changes(widths: pd.DataFrame) -> pd.DataFrame:
     """Give the relative change from ring to ring, 2 (w_t - w_{t-1}) / (w_t + w_{t-1}).
 
     Its absolute values are the terms of the mean sensitivity (Douglass 1920). It takes out the
-    level and the trend of a series, whatever curve the trend follows, has the same spread for
-    wide and narrow rings, and is bounded by -2 and 2, so that missing rings do no harm.
+    level and the slope of a series, has the same spread for wide and narrow rings, and is bounded
+    by -2 and 2, so that missing rings do no harm. What bends a trend stays in: trees of one age
+    agree in it without any weather.
     NaN where two rings in a row are missing, and in the first year of a series.
     """
     before = widths.shift()

@@ -90,7 +90,12 @@ TREELIST = ForeignTable(
             "basal area of the thicker trees",
             lambda r: r["thicker_m2ha"] * HA_PER_ACRE / _FT2,
         ),
-        Filled("TCuFt", "ft3", "`trees.stem_volume_m3`", lambda r: r["stem_volume_m3"] / _FT3),
+        Filled(
+            "TCuFt",
+            "ft3",
+            "`trees.stem_volume_m3`, over bark",
+            lambda r: r["stem_volume_m3"] / _FT3,
+        ),
         Filled(
             "MCuFt",
             "ft3",

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from forest.errors import InputError
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -70,6 +72,8 @@ class ForeignTable:
         """Make the table from prepared rows; columns that need more than the run holds are out."""
         import pandas as pd
 
+        if not len(run.years):
+            raise InputError("holds no years yet", where=str(run.path))
         columns = (c for c in self.filled if set(c.needs) <= set(run.tables))
         return pd.DataFrame({c.name: c.of(rows) for c in columns}, index=rows.index)
 

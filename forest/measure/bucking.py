@@ -7,6 +7,7 @@ module as waste, or cut one of the logs that fit. All stems are worked on togeth
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -61,8 +62,20 @@ class Product(NamedTuple):
         over_bark: bool = False,
         module_m: float = MODULE_M,
     ) -> Product:
-        """Make a product of any length from the shortest to the longest, in steps of the module."""
-        steps = np.arange(round(shortest_m / module_m), round(longest_m / module_m) + 1)
+        """Make a product of any length from the shortest to the longest, in steps of the module.
+
+        Lengths are multiples of the module: the shortest is rounded up to one, the longest down.
+        """
+        tiny = 1e-9
+        first = math.ceil(shortest_m / module_m - tiny)
+        last = math.floor(longest_m / module_m + tiny)
+        if last < first:
+            raise InputError(
+                f"no multiple of {module_m:g} m lies from {shortest_m:g} to {longest_m:g} m",
+                where=f"product '{name}'",
+                expected="a range of lengths that holds one",
+            )
+        steps = np.arange(first, last + 1)
         lengths = tuple((steps * module_m).tolist())
         return cls(name, lengths, top_diameter_cm, price_m3, over_bark)
 

@@ -218,13 +218,12 @@ def test_columns_that_need_other_tables_are_left_out(tmp_path: Path) -> None:
                 make(run)
 
 
-def test_a_run_without_years_gives_empty_tables(tmp_path: Path) -> None:
+def test_a_run_without_years_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "run.h5", ["trees", "stand", "events"], last=0)
     with open_run(path) as run:
         for make in (iland_trees, iland_stand, fvs_treelist, fvs_summary):
-            frame = make(run)
-            assert len(frame) == 0
-            assert len(frame.columns) > 5
+            with pytest.raises(InputError, match="holds no years yet"):
+                make(run)
 
 
 def test_the_documentation_lists_every_column() -> None:
