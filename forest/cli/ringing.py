@@ -164,15 +164,23 @@ def _of_stand(run: Any, height: float, year: int | None, dominant: int | None) -
 
 
 def _write_series(series: RingSeries, to: Path, force: bool) -> None:
-    """Write series, dated earlier if their years would lie after the present."""
+    """Write series, dated earlier if their years would lie after the present.
+
+    What the series are (tree, height, azimuth, pith offset, cambial age, years moved) goes into a
+    file beside them.
+    """
     from forest.dendro import write_csv, write_rwl
+    from forest.record.export import whole_file
 
     late = int(series.widths.index[-1]) - datetime.date.today().year
     dated = series.moved(-late) if late > 0 else series
     write = write_rwl if to.suffix.lower() == ".rwl" else write_csv
     write(dated.widths, to, overwrite=force)
+    about = to.with_name(f"{to.stem}_about.csv")
+    with whole_file(about, overwrite=True) as draft:
+        dated.about.to_csv(draft)
     first, last = dated.widths.index[0], dated.widths.index[-1]
-    typer.echo(f"{to}: {dated.widths.shape[1]} series, {first} to {last}")
+    typer.echo(f"{to}: {dated.widths.shape[1]} series, {first} to {last}; {about.name} tells which")
     if late > 0:
         typer.echo(
             f"all years are {late} earlier than in the run: "

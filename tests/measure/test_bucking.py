@@ -99,3 +99,11 @@ def test_equals_trying_every_cut(seed):
     for _, own in logs.groupby("stem"):
         end = own["from_m"] + own["length_m"]
         assert (own["from_m"].to_numpy()[1:] >= end.to_numpy()[:-1] - 1e-9).all()
+
+
+def test_lengths_lie_within_the_product() -> None:
+    """The shortest is rounded up to a multiple of the module, the longest down."""
+    product = Product.between("x", 2.05, 2.35, 10.0, 50.0)
+    assert product.lengths_m == pytest.approx((2.1, 2.2, 2.3))
+    with pytest.raises(InputError, match="no multiple of"):
+        Product.between("x", 2.05, 2.05, 10.0, 50.0)
