@@ -19,7 +19,7 @@ def shortest_turn(first: NDArray[np.float64], second: NDArray[np.float64]) -> ND
     """Give the matrices (..., 3, 3) that turn unit vectors into others the shortest way.
 
     Rodrigues' formula. Of the half turns between opposite directions it takes that about the
-    horizontal axis nearest to x.
+    axis across them that is nearest to x, or to y where they lie along x.
     """
     first, second = np.broadcast_arrays(first, second)
     axis = np.cross(first, second)
@@ -33,4 +33,9 @@ def shortest_turn(first: NDArray[np.float64], second: NDArray[np.float64]) -> ND
     cross -= np.swapaxes(cross, -1, -2)
     opposite = cosine < -1.0 + 1e-12
     turn = np.eye(3) + cross + cross @ cross / np.where(opposite, 1.0, 1.0 + cosine)
-    return np.asarray(np.where(opposite, np.diag((1.0, -1.0, -1.0)), turn))
+    along_x = np.abs(first[..., :1]) > 0.9
+    near = np.where(along_x, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    across = near - np.sum(near * first, axis=-1, keepdims=True) * first
+    across = across / np.linalg.norm(across, axis=-1, keepdims=True)
+    half = 2.0 * across[..., :, None] * across[..., None, :] - np.eye(3)
+    return np.asarray(np.where(opposite, half, turn))

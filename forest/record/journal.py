@@ -134,9 +134,18 @@ class JournaledFile(io.RawIOBase):
     def _apply(self) -> None:
         """Change bytes in place: no new room is needed, so a full disk cannot stop this."""
         # The superblock goes first: until it tells of the new length, addresses behind the old
-        # end count as errors, while a superblock ahead of the rest does no harm.
-        for (address, _), change in sorted(self._changes.items(), key=lambda item: item[0][0] != 0):
-            _write_all(self._fd, change, address)
+        # end count as errors, while a superblock ahead of the rest does no harm. It is written as
+        # all changes leave it, since another change may overlap it.
+        head = max((size for address, size in self._changes if address == 0), default=0)
+        if head:
+            top = bytearray(os.pread(self._fd, head, 0))
+            for first, last, change, address in self._overlaps(0, head):
+                top[first:last] = change[first - address : last - address]
+            _write_all(self._fd, top, 0)
+        for (address, size), change in self._changes.items():
+            skip = min(max(head - address, 0), size)
+            if skip < size:
+                _write_all(self._fd, change[skip:], address + skip)
         self._changes = {}
         journal_path(self._path).unlink(missing_ok=True)
 

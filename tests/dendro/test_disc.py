@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from forest.dendro.cores import bore
@@ -103,6 +103,8 @@ def test_a_cone_is_cut_square_and_lengthwise_by_hand():
 
 @settings(max_examples=25, deadline=None)
 @given(directions, directions)
+@example((-1.0, -1.0, -1.0), (0.2, 0.2, 0.2))
+@example((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 def test_turns_are_the_shortest(first, second):
     a, b = unit(first), unit(second)
     turn = shortest_turn(a, b)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from forest.record.journal import JournaledFile, journal_path
@@ -14,6 +14,7 @@ _WRITE = st.tuples(st.integers(0, 60), st.binary(min_size=1, max_size=20))
 _COMMIT = st.none()
 
 
+@example([(2, b"\x00"), None, (2, b"\x00"), (0, b"\x00\x00\x01"), None])
 @given(st.lists(st.one_of(_WRITE, _WRITE, _WRITE, _COMMIT), max_size=25))
 def test_equals_plain_bytes(steps: list[tuple[int, bytes] | None]) -> None:
     with tempfile.TemporaryDirectory() as folder:
