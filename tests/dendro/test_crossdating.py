@@ -43,11 +43,26 @@ def test_correlations_are_those_of_the_plain_way(seed):
     pd.testing.assert_series_equal(got, naive(widths), check_names=False)
 
 
-def test_the_age_trend_alone_is_no_agreement():
-    age = np.arange(60)[:, None]
-    noise = np.random.default_rng(3).lognormal(sigma=0.3, size=(60, 12))
-    widths = pd.DataFrame(5.0 * np.exp(-age / 15) * noise)
-    assert abs(interseries_correlation(widths).mean()) < 0.15
+def agreement(trend: np.ndarray, own: float, shared: float) -> float:
+    """Agreement of twelve series of one trend that differ by themselves and share a weather."""
+    rng = np.random.default_rng(3)
+    years = len(trend)
+    own_noise = rng.lognormal(sigma=own, size=(years, 12))
+    weather = rng.lognormal(sigma=shared, size=(years, 1))
+    return float(interseries_correlation(pd.DataFrame(trend[:, None] * own_noise * weather)).mean())
+
+
+def test_shared_weather_shows_beyond_a_shared_trend():
+    age = np.arange(1.0, 61.0)
+    for trend in (5.0 * np.exp(-age / 15), age * np.exp(-age / 12)):
+        assert agreement(trend, 0.3, 0.3) > agreement(trend, 0.3, 0.0) + 0.3
+    assert abs(agreement(5.0 * np.exp(-age / 15), 0.3, 0.0)) < 0.15
+
+
+def test_a_bent_trend_that_is_shared_stays_in():
+    """The limit that the documents name: smooth series of one age agree without any weather."""
+    age = np.arange(1.0, 61.0)
+    assert agreement(age * np.exp(-age / 12), 0.02, 0.0) > 0.7
 
 
 def test_too_short_or_constant_series_have_none():
