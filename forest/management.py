@@ -94,6 +94,8 @@ def fell(stand: Stand, tree_ids: Sequence[int], cause: str) -> None:
         raise InputError(f"unknown cause '{cause}', {nearest(cause, CAUSES)}", where="Stand.fell")
     rows = [stand.row_of(tree_id) for tree_id in tree_ids]
     measures = stand.measure()
+    if stand.regeneration is not None:
+        stand.regeneration.note_stumps(stand.rows, rows, measures)
     alive = np.ones(len(stand.rows.tree_id), np.bool_)
     for row in rows:
         if alive[row]:

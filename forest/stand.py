@@ -25,6 +25,7 @@ from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
+from forest.regeneration import Regeneration
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
@@ -65,6 +66,8 @@ class Stand:
         Id of the next tree.
     mechanics : Mechanics or None
         What bends and holds the trees, where the scenario has mechanics.
+    regeneration : Regeneration or None
+        Seeds and seedlings, where the scenario has regeneration.
     surroundings : Surroundings
         Light and space.
     memories : dict of str to Memory
@@ -101,6 +104,10 @@ class Stand:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
             plot = Plot(*scenario.plot.size_m, scenario.plot.boundary == "periodic")
             self.mechanics = Mechanics(spec, self.species, self.pipe_exponent, plot)
+        self.regeneration: Regeneration | None = None
+        if scenario.regeneration is not None and self.surroundings.canopy is not None:
+            self.regeneration = Regeneration(scenario, self.surroundings.canopy)
+            self.memories["regeneration"] = self.regeneration
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -140,8 +147,13 @@ class Stand:
         self._bend()
         measures, deaths = self._die()
         record = record_year(self, measures, deaths, accounts, before, rings)
+        grown = self.rows
         self._bury(deaths, measures)
         self._lap("record")
+        if self.regeneration is not None:
+            seedlings = self.regeneration.year(self, grown, measures, deaths, self._traits)
+            record.tables["regeneration"] = seedlings
+            self._lap("regenerate")
         return record
 
     def _expose(self) -> None:

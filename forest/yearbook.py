@@ -79,7 +79,8 @@ class YearRecord(NamedTuple):
     year : int
         Calendar year.
     tables : dict of table to columns
-        The year's rows of `/trees`, `/stand`, `/events`, `/rings` and `/carbon`.
+        The year's rows of `/trees`, `/stand`, `/events`, `/rings` and `/carbon`, and of others
+        that the scenario brings.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """

@@ -119,6 +119,11 @@ class Run:
         return self._frame("stability")
 
     @property
+    def regeneration(self) -> pd.DataFrame:
+        """A row per year and species, where the scenario has regeneration: seeds and seedlings."""
+        return self._frame("regeneration")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")

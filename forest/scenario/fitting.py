@@ -9,6 +9,7 @@ from forest.scenario import placing
 from forest.scenario.acts import check_acts
 from forest.scenario.complete import check_spots
 from forest.scenario.model import Explicit, Random, Regular
+from forest.scenario.regeneration import check_regeneration
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -26,6 +27,13 @@ def check_fit(scenario: Scenario) -> None:
     _picture_fits(scenario)
     _grid_fits(scenario)
     _trees_fit(scenario)
+    check_regeneration(
+        scenario.regeneration,
+        mode=scenario.mode,
+        environment=scenario.environment,
+        species=scenario.species,
+        planted=not isinstance(scenario.planting, Explicit) or bool(scenario.planting.trees),
+    )
     check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
 
 
