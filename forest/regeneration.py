@@ -179,11 +179,11 @@ class Regeneration:
             tally.rows["germinated_ha"][k] = float(n.sum()) * self.cells.per_hectare()
             mother = draw_mothers(
                 cell,
+                seeds[cell],
                 self.cells,
                 dispersal.table,
                 at[own],
                 borne[own],
-                rain,
                 seed=self._seed,
                 kind=k,
                 year=year,

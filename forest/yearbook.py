@@ -38,17 +38,26 @@ class Event(NamedTuple):
     volume_m3: float
 
     @classmethod
-    def of(cls, stand: Stand, row: int, kind: str, cause: str, measures: TreeMeasures) -> Event:
-        """Note an event of the tree in a row of the table."""
+    def of(
+        cls,
+        stand: Stand,
+        row: int,
+        kind: str,
+        cause: str,
+        measures: TreeMeasures,
+        place: int | None = None,
+    ) -> Event:
+        """Note an event of the tree in a row of the table, whose measures may stand elsewhere."""
+        place = row if place is None else place
         return cls(
             int(stand.rows.tree_id[row]),
             int(stand.rows.species[row]),
             kind,
             cause,
             int(stand.rows.mother_id[row]),
-            float(measures.dbh_cm[row]),
-            float(measures.height_m[row]),
-            float(measures.stem_volume_m3[row]),
+            float(measures.dbh_cm[place]),
+            float(measures.height_m[place]),
+            float(measures.stem_volume_m3[place]),
         )
 
 

@@ -24,7 +24,7 @@ class Regeneration(Table):
         "edge of the ground's cells that hold seedlings, a little more where the plot is no whole "
         "multiple; at least canopy.voxel_m",
         unit="m",
-        ge=0.1,
+        ge=0.25,
         le=20,
     )
     handover_height_m: float = quantity(

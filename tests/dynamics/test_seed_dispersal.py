@@ -112,16 +112,16 @@ def test_mothers_are_drawn_by_their_seeds() -> None:
     at, borne = np.array([0, 210, 399, 5]), np.array([100.0, 300.0, 50.0, 0.0])
     rain = 0.3
     where, count = 195, np.zeros(5)
-    for year in range(4000):
-        key = {"seed": 1, "kind": 0, "year": year}
-        found = draw_mothers(np.array([where]), cells, table, at, borne, rain, **key)
-        count[found[0]] += 1
 
     def weight(tree: int) -> float:
         dy, dx = (where // 20 - at[tree] // 20) % 20, (where % 20 - at[tree] % 20) % 20
         return float(borne[tree] * table[dy, dx])
 
     weights = np.array([weight(0), weight(1), weight(2), 0.0, rain])
+    for year in range(4000):
+        key = {"seed": 1, "kind": 0, "year": year}
+        seeds = np.array([weights.sum()])
+        count[draw_mothers(np.array([where]), seeds, cells, table, at, borne, **key)[0]] += 1
     assert count[3] == 0
     assert count / 4000 == pytest.approx(weights / weights.sum(), abs=0.035)
 
@@ -131,12 +131,13 @@ def test_mothers_are_the_same_on_threads() -> None:
     table = kernel_table("2dt", 5.0, 1.0, cells)
     rng = np.random.default_rng(3)
     at, borne = rng.integers(0, 900, 40), rng.uniform(0, 100, 40)
+    seeds = Dispersal("2dt", 5.0, 1.0, cells).fall(cells.sum(at, borne)) + 0.5
     found = []
     for threads in (1, 2):
         with using_threads(threads):
             found.append(
                 draw_mothers(
-                    np.arange(900), cells, table, at, borne, 0.5, seed=1, kind=0, year=2000
+                    np.arange(900), seeds, cells, table, at, borne, seed=1, kind=0, year=2000
                 )
             )
     np.testing.assert_array_equal(*found)

@@ -57,6 +57,14 @@ class Cells:
         grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
         return self.of(grid_x.ravel(), grid_y.ravel())
 
+    def around(self, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell which cells are among these or touch one of them, wherever the plot wraps."""
+        grid = np.zeros((self.ny, self.nx), np.bool_)
+        grid.ravel()[cell] = True
+        for axis in (0, 1):
+            grid |= np.roll(grid, 1, axis) | np.roll(grid, -1, axis)
+        return grid.ravel()
+
     def per_hectare(self) -> float:
         """Give the factor from a number on the plot to one on a hectare."""
         return 10_000.0 / (self.area * self.count)

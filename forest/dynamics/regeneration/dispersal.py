@@ -159,17 +159,20 @@ class Dispersal:
 
 
 @njit
-def _weight(table: Any, nx: Any, borne: Any, at: Any, tree: Any, y: Any, x: Any) -> Any:
-    """Give the seeds that a tree sends to a cell."""
-    ty = at[tree] // nx
-    tx = at[tree] - ty * nx
-    dy = y - ty
-    dx = x - tx
-    if dy < 0:
-        dy += table.shape[0]
-    if dx < 0:
-        dx += table.shape[1]
-    return borne[tree] * table[dy, dx]
+def _mother(y: Any, x: Any, table: Any, place: Any, borne: Any, left: Any) -> Any:
+    """Find the tree at whose seeds for a cell a draw is used up; -1 if there is one left."""
+    my, mx = table.shape
+    for tree in range(len(borne)):
+        dy = y - place[tree, 0]
+        dx = x - place[tree, 1]
+        if dy < 0:
+            dy += my
+        if dx < 0:
+            dx += mx
+        left -= borne[tree] * table[dy, dx]
+        if left < 0.0:
+            return tree
+    return -1
 
 
 @driver
@@ -177,11 +180,11 @@ def _draw_mothers(
     first: Any,
     step: Any,
     cell: Any,
+    seeds: Any,
     nx: Any,
     table: Any,
-    at: Any,
+    place: Any,
     borne: Any,
-    rain: Any,
     key: Any,
     tree: Any,
 ) -> None:
@@ -189,25 +192,17 @@ def _draw_mothers(
         for k in range(len(cell) * chunk // _CHUNKS, len(cell) * (chunk + 1) // _CHUNKS):
             y = cell[k] // nx
             x = cell[k] - y * nx
-            total = 0.0
-            for t in range(len(at)):
-                total += _weight(table, nx, borne, at, t, y, x)
             draw, _, _, _ = uniforms(key[0], np.int64(STREAM_MOTHER), cell[k], key[1], key[2])
-            left = draw * (total + rain)
-            for t in range(len(at)):
-                left -= _weight(table, nx, borne, at, t, y, x)
-                if left < 0.0:
-                    tree[k] = t
-                    break
+            tree[k] = _mother(y, x, table, place, borne, draw * seeds[k])
 
 
 def draw_mothers(
     cell: NDArray[np.int64],
+    seeds: NDArray[np.float64],
     cells: Cells,
     table: NDArray[np.float64],
     at: NDArray[np.int64],
     borne: NDArray[np.float64],
-    rain: float,
     *,
     seed: int,
     kind: int,
@@ -219,6 +214,8 @@ def draw_mothers(
     ----------
     cell : int64 (n,)
         Cells of the cohorts, each once.
+    seeds : float64 (n,)
+        Seeds that fall into them: what the trees do not send comes from outside.
     cells : Cells
     table : float64 (my, mx)
         Of the species; see `kernel_table`.
@@ -226,8 +223,6 @@ def draw_mothers(
         Cells of the trees of the species.
     borne : float64 (trees,)
         Their seeds.
-    rain : float
-        Seeds that a cell gets from outside.
     seed, kind, year : int
         Seed of the scenario, index of the species and calendar year, of which draws are a function.
 
@@ -238,9 +233,10 @@ def draw_mothers(
     """
     tree = np.full(len(cell), -1, np.int64)
     fertile = np.flatnonzero(borne > 0.0)
+    place = np.stack(np.divmod(at[fertile], cells.nx), axis=1)
     key = np.array([seed, kind, year], np.int64)
     nx = np.int64(cells.nx)
-    in_threads(_draw_mothers, cell, nx, table, at[fertile], borne[fertile], float(rain), key, tree)
+    in_threads(_draw_mothers, cell, seeds, nx, table, place, borne[fertile], key, tree)
     known = tree >= 0
     tree[known] = fertile[tree[known]]
     return tree

@@ -62,8 +62,8 @@ def find_places(
     """
     size = cells.nx * cells.dx, cells.ny * cells.dy
     stems = Spots(size, LEAST_DISTANCE_M, periodic=cells.periodic)
-    for k in range(len(x)):
-        stems.take(float(x[k]), float(y[k]), k)
+    for tree in np.flatnonzero(cells.around(cohorts.cell)[cells.of(x, y)]).tolist():
+        stems.take(float(x[tree]), float(y[tree]), tree)
     found: list[tuple[float, float, int]] = []
     asked: dict[int, int] = {}  # tries in each cell so far: no two have the same draw
     for k, cell in enumerate(cohorts.cell.tolist()):
