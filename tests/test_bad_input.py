@@ -66,7 +66,7 @@ def refused(folder: Path, *words: str | Path | int, says: str) -> None:
         ("output =", "mechanics = true\noutput =", "mechanics: True is not allowed"),
         ("[10, 10]", "[10, 0]", "plot.size_m"),
         ("periodic", "torus", "plot.boundary"),
-        ("0.15", "-0.15", "weather.noise_sd"),
+        ("0.15", "-0.15", "climate.noise_sd"),
         ("pinus_sylvestris", "pinus_silvestris", "did you mean 'pinus_sylvestris'?"),
         ("density_ha = 1000", "density_ha = 1e300", "planting.density_ha"),
         ("checkpoint_every_years = 3", "checkpoint_every_years = 0", "checkpoint_every_years"),
