@@ -125,7 +125,7 @@ class Stand:
             If an act cannot be done, or the climate ends before; then the stand is as it was.
         """
         self._clock = time.perf_counter()
-        self.climate.values(self.year + 1)  # a year that it does not know is refused at once
+        self.climate.check_known(self.year + 1)
         management.act(self, self._traits.of["branch_pipe"])
         self._lap("act")
         self.steps += 1

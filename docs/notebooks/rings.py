@@ -41,8 +41,6 @@ cores.about[["tree_id", "species", "azimuth_deg", "first_year", "pith_offset", "
 # cores agree with each other, and does the chronology follow the weather that the run was given?
 
 # %%
-import pandas as pd
-
 chronology = (cores.widths / cores.widths.rolling(11, center=True, min_periods=6).mean()).mean(
     axis=1
 )

@@ -142,6 +142,22 @@ class Climate:
         self._start = scenario.start_year
         self._responses = [species.response for species in scenario.species_list]
 
+    def check_known(self, year: int) -> None:
+        """Refuse a year that the series does not cover, as when a stand is driven on by hand.
+
+        Raises
+        ------
+        InputError
+        """
+        for variable in self._said.given:
+            if math.isnan(self._value(year, variable)):
+                series = self._said.series
+                raise InputError(
+                    f"no {variable} of {year}",
+                    where="climate.series",
+                    expected=f"a year from {series[0].year} to {series[-1].year}",
+                )
+
     def values(self, year: int) -> dict[str, float]:
         """Give the climate of a calendar year, as the run file tells it.
 
@@ -149,21 +165,8 @@ class Climate:
         -------
         dict of str to float
             Each of `VARIABLES`; NaN where the scenario says nothing. The growth index is then 1.
-
-        Raises
-        ------
-        InputError
-            If the series does not cover the year, as when a stand is driven on by hand.
         """
         found = {variable: self._value(year, variable) for variable in VARIABLES}
-        series = self._said.series
-        for variable in self._said.given:
-            if math.isnan(found[variable]):
-                raise InputError(
-                    f"no {variable} of {year}",
-                    where="climate.series",
-                    expected=f"a year from {series[0].year} to {series[-1].year}",
-                )
         index = found[GROWTH]
         if math.isnan(index):
             index = 1.0
@@ -181,11 +184,6 @@ class Climate:
         Returns
         -------
         float64 (species,)
-
-        Raises
-        ------
-        InputError
-            As `values`.
         """
         now = self.values(year)
         before = [

@@ -46,8 +46,8 @@ class Scenario(Table):
         Scenario(years=10, plot={"size_m": [10, 10]}, environment={"shadow": {}},
                  species={"pinus_sylvestris": {}}, planting={"kind": "random", "density_ha": 4000})
 
-    Files that it names (stem maps, climates, marker clouds) are read at once, and species are completed
-    from the shipped ones, so a scenario and its `to_toml` stand for themselves.
+    Files that it names (stem maps, climates, marker clouds) are read at once, and species are
+    completed from the shipped ones, so a scenario and its `to_toml` stand for themselves.
 
     Raises
     ------

@@ -14,7 +14,6 @@ from forest.species.curves import Curve, FactorCurve
 from forest.species.response import Response
 from forest.species.schema import Refusal, Table, quantity
 
-
 Direction = tuple[
     Annotated[float, Field(ge=-1, le=1)],
     Annotated[float, Field(ge=-1, le=1)],
