@@ -121,10 +121,11 @@ def test_a_climate_may_go_on_when_a_run_is_resumed(tmp_path: Path) -> None:
         return f"climate.series=[{', '.join(rows)}]"
 
     out, values = tmp_path / "run.h5", [1.0, 0.5, 1.1, 0.9, 1.0, 0.4]
-    simulate(tiny("years=4", series(values[:4])), out).close()
+    samples = "output.sample_trees={}"
+    simulate(tiny("years=4", series(values[:4]), samples), out).close()
     with pytest.raises(InputError, match="different scenario"):
-        simulate(tiny("years=6", series([0.9, *values[1:]])), out, resume=True)
-    longer = tiny("years=6", series(values))
+        simulate(tiny("years=6", series([0.9, *values[1:]]), samples), out, resume=True)
+    longer = tiny("years=6", series(values), samples)
     with simulate(longer, out, resume=True) as run, simulate(longer, tmp_path / "b.h5") as whole:
         assert_same_runs(run, whole)
         assert run.climate["growth_index"].tolist() == [v for v in values for _ in range(2)]
