@@ -84,6 +84,10 @@ def stability(
 def landscape(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a sweep.")],
     year: Annotated[int | None, typer.Option(help="Default: the last year of any plot.")] = None,
+    least_basal_area: Annotated[
+        float,
+        typer.Option(metavar="M2HA", help="Below this basal area no species dominates a plot."),
+    ] = 1.0,
     to: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="The plots as a mosaic, and over time.")
     ] = None,
@@ -116,7 +120,7 @@ def landscape(
 
     if to is not None:
         check_picture(to, force)
-    found = read_landscape(folder)
+    found = read_landscape(folder, least_basal_area_m2ha=least_basal_area)
     Console().print(landscape_table(found, year))
     if csv is not None:
         rows = write_frame(lambda: found.plots, csv, overwrite=force)

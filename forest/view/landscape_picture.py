@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _MOSAICS = 4
+_LONGEST = 24  # characters of a label
 _PALEST = 0.25  # share of a species' colour in a tile without height
 _NOTHING: RGB = (0.88, 0.87, 0.84)
 
@@ -98,12 +99,12 @@ def _mosaic(plots: pd.DataFrame) -> _Mosaic:
     settings = list(plots.columns[1 : plots.columns.get_loc("replicate")])
     varied = [name for name in settings if first[name].nunique(dropna=False) > 1]
     groups = first.groupby(settings, sort=False, dropna=False)
-    sets = {_label(of.iloc[0], varied): list(of["run"]) for _, of in groups}
-    if max(len(runs) for runs in sets.values()) == 1:
-        sets = {"": [run for runs in sets.values() for run in runs]}
-    columns = _columns([len(runs) for runs in sets.values()])
+    sets = [(_label(of.iloc[0], varied), list(of["run"])) for _, of in groups]
+    if max(len(runs) for _, runs in sets) == 1:
+        sets = [("", [run for _, runs in sets for run in runs])]
+    columns = _columns([len(runs) for _, runs in sets])
     place, labels, row = {}, [], 0
-    for label, runs in sets.items():
+    for label, runs in sets:
         for k, run in enumerate(runs):
             place[run] = (row + k // columns, k % columns)
         rows = math.ceil(len(runs) / columns)
@@ -113,10 +114,11 @@ def _mosaic(plots: pd.DataFrame) -> _Mosaic:
 
 
 def _label(plot: pd.Series[Any], varied: list[str]) -> str:
-    return "\n".join(
+    texts = [
         str(plot[name]) if name == "scenario" else f"{name.split('.')[-1]} = {plot[name]}"
         for name in varied
-    )
+    ]
+    return "\n".join(text if len(text) <= _LONGEST else text[:_LONGEST] + "…" for text in texts)
 
 
 def _columns(sizes: list[int]) -> int:
