@@ -119,6 +119,11 @@ class Run:
         return self._frame("stability")
 
     @property
+    def climate(self) -> pd.DataFrame:
+        """A row per year and species: the climate, and the species' factor on income."""
+        return self._frame("climate")
+
+    @property
     def regeneration(self) -> pd.DataFrame:
         """A row per year and species, where the scenario has regeneration: seeds and seedlings."""
         return self._frame("regeneration")
