@@ -22,7 +22,7 @@ BASE: dict[str, Any] = {
     "years": YEARS,
     "start_year": 2001,
     "plot": {"size_m": [8, 8], "boundary": "periodic"},
-    "weather": {"noise_sd": 0.1},
+    "climate": {"noise_sd": 0.1},
     "environment": {"shadow": {}, "canopy": {}},
     "species": {
         "betula_pendula": {"regeneration": EARLY},
