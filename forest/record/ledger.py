@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.record.schema import EVENT_KINDS, STATUS
+from forest.record.schema import DEATH_CAUSES, EVENT_KINDS, FELLING_CAUSES, STATUS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -60,6 +63,54 @@ def population_row(
     row = {"year": year, "living_before": living_before, **count, "living": living}
     del row["pruned"]
     return {name: np.array([value], np.int32) for name, value in row.items()}
+
+
+def by_cause(population: pd.DataFrame, events: pd.DataFrame) -> pd.DataFrame:
+    """Set up the ledger of the living with a column for each cause of death and of felling.
+
+    Parameters
+    ----------
+    population, events : DataFrame
+        The whole tables of a run.
+
+    Returns
+    -------
+    DataFrame
+        A row per year, its index: `living_before`, `planted`, `recruited`, `died_<cause>` for
+        each of `DEATH_CAUSES`, `felled_<cause>` for each of `FELLING_CAUSES`, `windthrown` and
+        `living`, and columns for whatever else the events name.
+
+    Raises
+    ------
+    LedgerError
+        If the events of a year do not lead from `living_before` to `living`, or a year does not
+        begin with the trees with which the one before ended.
+    """
+    years = population["year"].to_numpy()
+    kinds, causes = events["kind"].astype(str), events["cause"].astype(str)
+    names = kinds.where(~kinds.isin(("died", "felled")), kinds + "_" + causes)
+    known = (
+        "planted",
+        "recruited",
+        *(f"died_{cause}" for cause in DEATH_CAUSES),
+        *(f"felled_{cause}" for cause in FELLING_CAUSES),
+        "windthrown",
+    )
+    further = sorted(set(names) - {*known, "pruned"})
+    ledger = population.set_index("year")[["living_before"]].astype(np.int64)
+    event_years = events["year"].to_numpy()
+    for name in (*known, *further):
+        place = np.searchsorted(years, event_years[(names == name).to_numpy()])
+        ledger[name] = np.bincount(place, minlength=len(years))
+    ledger["living"] = population["living"].to_numpy(np.int64)
+    came = ledger["planted"] + ledger["recruited"]
+    went = ledger[[n for n in (*known, *further) if n not in ("planted", "recruited")]].sum(axis=1)
+    gap = (ledger["living_before"] + came - went - ledger["living"]).to_numpy()
+    gap[1:] += (ledger["living_before"].to_numpy()[1:] - ledger["living"].to_numpy()[:-1]) != 0
+    if gap.any():
+        year = int(years[np.flatnonzero(gap)[0]])
+        raise LedgerError(f"the events of {year} do not account for its living trees")
+    return ledger
 
 
 def check_carbon(year: int, carbon: Columns) -> None:

@@ -84,6 +84,11 @@ def _number(file: str, line: int, row: dict[str, str], column: str) -> float:
     return value
 
 
+def read_rows(file: str, context: Any) -> list[tuple[int, dict[str, str]]]:
+    """Read the line number and the cells, by column, of every row of a CSV file."""
+    return list(_rows(file, context, ()))
+
+
 def read_stem_map(
     file: str, default_species: str, context: Any
 ) -> list[tuple[int, float, float, str]]:

@@ -9,6 +9,7 @@ from forest.scenario import placing
 from forest.scenario.acts import check_acts
 from forest.scenario.complete import check_spots
 from forest.scenario.model import Explicit, Random, Regular
+from forest.scenario.mortality import check_mortality
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -27,6 +28,13 @@ def check_fit(scenario: Scenario) -> None:
     _grid_fits(scenario)
     _trees_fit(scenario)
     check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
+    check_mortality(
+        scenario.mortality,
+        mechanics=scenario.mechanics is not None,
+        plot=scenario.plot,
+        species=scenario.species,
+        years=scenario.calendar,
+    )
 
 
 def _wind_has_a_price(scenario: Scenario) -> None:
