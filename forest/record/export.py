@@ -140,8 +140,14 @@ def _fates(run: Run) -> str:
     else:
         ledger = run.population
         totals = ledger.drop(columns=["year", "living_before", "living"]).sum()
-    parts = [f"{n:,} {str(name).replace('_', ' of ', 1)}" for name, n in totals.items() if n]
+    parts = [f"{n:,} {_words(str(name))}" for name, n in totals.items() if n]
     return ", ".join([*parts, f"{int(ledger['living'].iloc[-1]):,} living"])
+
+
+def _words(column: str) -> str:
+    """Write a column of the ledger as words: died_no_buds is died (no buds)."""
+    kind, _, cause = column.partition("_")
+    return f"{kind} ({cause.replace('_', ' ')})" if cause else kind
 
 
 def _span(run: Run) -> str:

@@ -18,6 +18,7 @@ Columns = Mapping[str, NDArray[Any]]
 #: Largest allowed gap of the carbon ledger, relative to its largest entry.
 CARBON_TOLERANCE = 1e-6
 
+_CAME = ("planted", "recruited")
 _SPENT = ("leaves", "upkeep", "extension", "ring", "reserve_change")
 
 
@@ -86,31 +87,35 @@ def by_cause(population: pd.DataFrame, events: pd.DataFrame) -> pd.DataFrame:
         If the events of a year do not lead from `living_before` to `living`, or a year does not
         begin with the trees with which the one before ended.
     """
-    years = population["year"].to_numpy()
-    kinds, causes = events["kind"].astype(str), events["cause"].astype(str)
-    names = kinds.where(~kinds.isin(("died", "felled")), kinds + "_" + causes)
     known = (
-        "planted",
-        "recruited",
+        *_CAME,
         *(f"died_{cause}" for cause in DEATH_CAUSES),
         *(f"felled_{cause}" for cause in FELLING_CAUSES),
         "windthrown",
     )
+    kinds, causes = events["kind"].astype(str), events["cause"].astype(str)
+    names = kinds.where(~kinds.isin(("died", "felled")), kinds + "_" + causes)
     further = sorted(set(names) - {*known, "pruned"})
+    years = population["year"].to_numpy()
     ledger = population.set_index("year")[["living_before"]].astype(np.int64)
-    event_years = events["year"].to_numpy()
     for name in (*known, *further):
-        place = np.searchsorted(years, event_years[(names == name).to_numpy()])
+        place = np.searchsorted(years, events["year"].to_numpy()[(names == name).to_numpy()])
         ledger[name] = np.bincount(place, minlength=len(years))
     ledger["living"] = population["living"].to_numpy(np.int64)
-    came = ledger["planted"] + ledger["recruited"]
-    went = ledger[[n for n in (*known, *further) if n not in ("planted", "recruited")]].sum(axis=1)
-    gap = (ledger["living_before"] + came - went - ledger["living"]).to_numpy()
-    gap[1:] += (ledger["living_before"].to_numpy()[1:] - ledger["living"].to_numpy()[:-1]) != 0
-    if gap.any():
-        year = int(years[np.flatnonzero(gap)[0]])
-        raise LedgerError(f"the events of {year} do not account for its living trees")
+    _check_causes(ledger)
     return ledger
+
+
+def _check_causes(ledger: pd.DataFrame) -> None:
+    """Check that each year's columns lead to its living trees, and begin with those before."""
+    columns = {str(name): column.to_numpy() for name, column in ledger.items()}
+    before, living = columns.pop("living_before"), columns.pop("living")
+    change = sum(n if name in _CAME else -n for name, n in columns.items())
+    wrong = before + change != living
+    wrong[1:] |= before[1:] != living[:-1]
+    if wrong.any():
+        year = ledger.index[int(np.flatnonzero(wrong)[0])]
+        raise LedgerError(f"the events of {year} do not account for its living trees")
 
 
 def check_carbon(year: int, carbon: Columns) -> None:
