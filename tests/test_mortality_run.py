@@ -33,6 +33,7 @@ EVENTS = (
 )
 RULES = [
     "planting.density_ha=4000",
+    "output.sample_trees={ids=[1, 3]}",
     "species.fagus_sylvatica.mortality.background_per_year=0.1",
     "species.pinus_sylvestris.mortality={longevity_years=9, snag_half_life_years=3}",
     "mortality={age=true, background=true, buckling=true, snags=true}",
@@ -104,7 +105,9 @@ def test_info_tells_the_causes(run: Run) -> None:
 def test_same_bits_on_threads_and_resumed(run: Run, tmp_path: Path) -> None:
     with simulate(tiny(*RULES), tmp_path / "two.h5", threads=2) as two:
         assert_same_runs(run, two)
-    simulate(tiny(*RULES[:-2], "years=3"), tmp_path / "run.h5").close()  # deaths and acts come later
+    simulate(
+        tiny(*RULES[:-2], "years=3"), tmp_path / "run.h5"
+    ).close()  # deaths and acts come later
     with simulate(tiny(*RULES), tmp_path / "run.h5", resume=True) as resumed:
         assert_same_runs(run, resumed)
     assert np.diff(run.deadwood.snags_ha[run.deadwood.species == "all"]).min() < 0  # some fell
