@@ -146,18 +146,18 @@ def test_years_on_file_keep_their_deaths(run: Run, tmp_path: Path) -> None:
 def test_deaths_that_cannot_be(tmp_path: Path) -> None:
     """One line, exit 2, and all years before on file; corrected, the run goes on."""
     scenario, out = tmp_path / "tiny.toml", tmp_path / "run.h5"
-    (tmp_path / "deaths.csv").write_text("year,tree_id\n2003,1\n2005,1\n")
+    (tmp_path / "deaths.csv").write_text("year,tree_id,share\n2003,,1\n2005,1,\n")
     scenario.write_text(TOML + '\n[mortality]\nevents = "deaths.csv"\n')
     code, _, err = forest("run", scenario, "--out", out)
     assert code == 2
     (line,) = (line for line in err.splitlines() if line.startswith("forest: error: "))
     assert "'deaths.csv' line 3 in 2005: no living tree has the id 1" in line
-    (tmp_path / "deaths.csv").write_text("year,tree_id\n2003,1\n2005,2\n")
+    (tmp_path / "deaths.csv").write_text("year,tree_id,share\n2003,,1\n")
     code, _, err = forest("run", scenario, "--out", out, "--resume")
     assert code == 0, err
     with open_run(out) as run:
-        died = run.events[run.events.cause == "other"]
-        assert list(zip(died.year, died.tree_id, strict=True)) == [(2003, 1), (2005, 2)]
+        assert run.ledger.died_other.to_dict()[2003] == 10
+        assert run.years[-1] == 2008
 
 
 def test_a_death_in_the_first_year_is_refused_before_it() -> None:
@@ -177,6 +177,15 @@ def test_bad_rows_leave_no_file(tmp_path: Path) -> None:
             "'half' is not allowed; expected a number\n"
         )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["deaths.csv", "tiny.toml"]
+
+
+def test_paper_mode_knows_no_suppression() -> None:
+    rules = "mortality={background=true, snags=true}"
+    often = "species.fagus_sylvatica.mortality.background_per_year=0.3"
+    records = steps(Stand(tiny("mode=paper", rules, often)), 6)
+    causes = {CAUSES[c] for r in records for c in r.tables["events"]["cause"]}
+    assert causes == {"none", "background"}
+    assert records[-1].tables["deadwood"]["lying_tha"][-1] > 0.0
 
 
 def test_trees_felled_in_the_year_are_spared_the_rest() -> None:

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from forest.stand import Stand
 
 #: Trees that die of these lie at once.
-LYING_CAUSES = ("wind", "buckling")
+_LYING_CAUSES = ("wind", "buckling")
 #: Felled trees that are left in the stand; all others are taken away.
-LEFT_CAUSES = ("tending",)
+_LEFT_CAUSES = ("tending",)
 
 #: Height of the slices in which a stem's plant area is told, m.
 _SLICE_M = 0.5
@@ -126,6 +126,11 @@ def years_standing(
     return np.clip(np.ceil(years), 1.0, 1e6).astype(np.int32)
 
 
+def is_left(kind: str, cause: str) -> bool:
+    """Tell whether a tree that goes between two years stays in the stand as lying dead wood."""
+    return kind == "windthrown" or cause in _LEFT_CAUSES
+
+
 class DeadWood:
     """The snags and the lying dead wood of a stand.
 
@@ -181,7 +186,8 @@ class DeadWood:
         self.snags = self.snags.keep(~falls)
         dead = [death.row for death in deaths]
         stands = np.array(
-            [d.cause not in LYING_CAUSES and measures.dbh_cm[d.row] > 0.0 for d in deaths], np.bool_
+            [d.cause not in _LYING_CAUSES and measures.dbh_cm[d.row] > 0.0 for d in deaths],
+            np.bool_,
         )
         fresh = self._fresh(stand, np.array(dead, np.int64), measures)
         self.flows["input"] = self.flows["input"] + _sums(fresh, k)

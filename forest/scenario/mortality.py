@@ -178,3 +178,20 @@ def check_mortality(
             raise Refusal(f"{label}unknown species {event.species[:60]!r}, {hint}", key=key)
         if event.x_m is not None and event.y_m is not None:
             check_inside(event.x_m, event.y_m, plot, key=key, label=label)
+    _check_dead_once(mortality.events)
+
+
+def _check_dead_once(events: tuple[Disturbance, ...]) -> None:
+    """Refuse to let a tree die in two years."""
+    died: dict[int, int] = {}
+    for i, event in sorted(enumerate(events), key=lambda entry: entry[1].year):
+        if event.tree_id is None:
+            continue
+        year = died.setdefault(event.tree_id, event.year)
+        if year != event.year:
+            label = f"{event.source}: " if event.source else ""
+            raise Refusal(
+                f"{label}tree {event.tree_id} has died in {year}",
+                key="mortality.events" if event.source else f"mortality.events[{i}].tree_id",
+                expected="a tree that still lives",
+            )

@@ -88,12 +88,21 @@ def test_a_bad_row_is_named(tmp_path: Path, row: str, says: str) -> None:
         ('events = "death.csv"', "mortality.events: .*death.csv"),
         ("events = [{year = 2003}]", r"mortality.events\[0\]: names no trees"),
         ("events = [{year = 2013, share = 1}]", r"mortality.events\[0\]: 2013 is not a year"),
+        (
+            "events = [{year = 2004, tree_id = 1}, {year = 2003, tree_id = 1}]",
+            r"mortality.events\[0\].tree_id: tree 1 has died in 2003; expected a tree that still",
+        ),
         ("events = 3", "mortality.events: 3 is not allowed"),
     ],
 )
 def test_refusals(tmp_path: Path, rules: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         load(tmp_path, CSV, rules)
+
+
+def test_a_tree_dies_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"'deaths.csv' line 3: tree 1 has died in 2003"):
+        load(tmp_path, "year,tree_id\n2003,1\n2004,1\n")
 
 
 def test_an_unknown_column_is_refused(tmp_path: Path) -> None:
