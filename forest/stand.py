@@ -14,7 +14,7 @@ from forest.dynamics import mortality
 from forest.dynamics.mortality import Death
 from forest.dynamics.planting import headings
 from forest.dynamics.snags import DeadWood
-from forest.dynamics.weather import income_factor
+from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
 from forest.growth.allocate import allocate
@@ -74,6 +74,8 @@ class Stand:
         Id of the next tree.
     mechanics : Mechanics or None
         What bends and holds the trees, where the scenario has mechanics.
+    climate : Climate
+        What each year is like, and what the species make of it.
     surroundings : Surroundings
         Light and space.
     dead_wood : DeadWood or None
@@ -106,6 +108,7 @@ class Stand:
         self._ring_heights = np.array(scenario.output.ring_heights_m, np.float64)
         self._pipes_before = np.empty(0, np.float32)
         self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.memories: dict[str, Memory] = {"surroundings": self.surroundings}
         self.mechanics: Mechanics | None = None
@@ -134,10 +137,11 @@ class Stand:
 
         Raises
         ------
-        ActError
-            If an act cannot be done; then the stand is as it was.
+        InputError
+            If an act cannot be done, or the climate ends before; then the stand is as it was.
         """
         self._clock = time.perf_counter()
+        self.climate.check_known(self.year + 1)
         mortality.check_due(self)
         management.act(self, self._traits.of["branch_pipe"])
         self._lap("act")
@@ -272,16 +276,10 @@ class Stand:
     def growth_year(self) -> Year:
         """Tell growth what it must know of the current step."""
         s = self.scenario
-        factor = income_factor(
-            self.year,
-            s.seed,
-            s.weather.noise_sd,
-            [(e.year, e.factor) for e in s.weather.extreme_years],
-        )
         return Year(
             step=self.steps,
             seed=s.seed,
-            income_factor=np.full(len(self.species), factor * s.site.productivity),
+            income_factor=self.climate.factors(self.year) * s.site.productivity,
             full_light=self._full_light,
             paper=self._paper,
             balance=s.growth.bud_fate == "balance",
