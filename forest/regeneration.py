@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 Columns = dict[str, NDArray[Any]]
 
-#: What breaks a stem and leaves a stump with living roots.
-_BREAKING = ("buckling",)
+#: What breaks or burns a stem and leaves a stump with living roots.
+_BREAKING = ("buckling", "fire")
 #: Bounds of the height classes of `/regeneration`, m.
 _LOW_M, _HIGH_M = 0.1, 0.5
 

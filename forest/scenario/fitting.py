@@ -10,6 +10,7 @@ from forest.scenario.acts import check_acts
 from forest.scenario.climate import check_covered
 from forest.scenario.complete import check_spots
 from forest.scenario.model import Explicit, Random, Regular
+from forest.scenario.mortality import check_mortality
 from forest.scenario.regeneration import check_regeneration
 from forest.species.schema import Refusal
 
@@ -37,6 +38,13 @@ def check_fit(scenario: Scenario) -> None:
         planted=not isinstance(scenario.planting, Explicit) or bool(scenario.planting.trees),
     )
     check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
+    check_mortality(
+        scenario.mortality,
+        mechanics=scenario.mechanics is not None,
+        plot=scenario.plot,
+        species=scenario.species,
+        years=scenario.calendar,
+    )
 
 
 def _wind_has_a_price(scenario: Scenario) -> None:

@@ -19,7 +19,15 @@ _DiscHeight = Annotated[float, Field(gt=0, le=150)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
 _TableName = Literal[
-    "trees", "stand", "events", "rings", "carbon", "stability", "climate", "regeneration"
+    "trees",
+    "stand",
+    "events",
+    "rings",
+    "carbon",
+    "stability",
+    "climate",
+    "deadwood",
+    "regeneration",
 ]
 
 
@@ -363,11 +371,21 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        ("trees", "stand", "events", "rings", "carbon", "stability", "climate", "regeneration"),
-        "tables to write; stability only has rows where there is a table mechanics, and "
-        "regeneration where there is one of that name",
+        (
+            "trees",
+            "stand",
+            "events",
+            "rings",
+            "carbon",
+            "stability",
+            "climate",
+            "deadwood",
+            "regeneration",
+        ),
+        "tables to write; stability only has rows where there is a table mechanics, deadwood "
+        "where there are snags, regeneration where there is a table of that name",
         unit="",
-        max_length=8,
+        max_length=9,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(

@@ -33,6 +33,7 @@ from forest.scenario.model import (
     SpeciesUse,
     StemMap,
 )
+from forest.scenario.mortality import Mortality
 from forest.scenario.regeneration import Regeneration
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
@@ -72,6 +73,7 @@ class Scenario(Table):
     climate: Climate = Climate()
     growth: Growth = Growth()
     mechanics: Mechanics | None = None
+    mortality: Mortality = Mortality()
     regeneration: Regeneration | None = None
     environment: Environment
     species: dict[str, SpeciesUse] = quantity(
