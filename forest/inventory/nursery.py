@@ -28,8 +28,9 @@ _MOST_YEARS = 400
 _PATIENCE, _LEAST_RISE = 20, 1.02
 #: Trees within this difference of ln(height) tell how thick and how thin one of that height can be.
 _BAND = 0.2
-#: Weights of the squared differences of ln(height), ln(dbh) and crown base per height.
-_HEIGHT, _DBH, _CROWN = 4.0, 1.0, 2.0
+#: Weights of the squared differences of ln(height), ln(dbh), crown base per height, height per that
+#: of the tallest around, and ln(age).
+_HEIGHT, _DBH, _CROWN, _RANK, _AGE = 4.0, 1.0, 2.0, 0.1, 0.25
 #: Standard deviations of ln(height) and ln(dbh) by which a tree looks beside its own.
 _BESIDE = (0.03, 0.05)
 #: What a missing dbh counts as, as a difference of ln(dbh).
@@ -44,13 +45,18 @@ class Wanted(NamedTuple):
     height_m : float64
     dbh_cm : float64
         Over bark; NaN below 1.3 m.
-    crown_base_m : float64
+    crown_base_m, age : float64
         NaN where it is not known.
+    rank : float64
+        Height per that of the tallest tree around, 0 to 1: one that was always overtopped has
+        another crown than a young one of its height.
     """
 
     height_m: NDArray[np.float64]
     dbh_cm: NDArray[np.float64]
     crown_base_m: NDArray[np.float64]
+    age: NDArray[np.float64]
+    rank: NDArray[np.float64]
 
 
 class Donor(NamedTuple):
@@ -193,7 +199,7 @@ class _Finder:
         """Look over the trees of a stand at the end of a year."""
         self._tallest = max(self._tallest, float(measures.height_m.max()))
         self._note_range(measures)
-        distance = self._distances(measures)
+        distance = self._distances(measures, stand.steps)
         best = np.argmin(distance, axis=1)
         nearest = distance[np.arange(len(best)), best]
         better = np.flatnonzero(nearest < self._distance)
@@ -210,7 +216,7 @@ class _Finder:
         donors = [donor for donor in self._donors if donor is not None]
         return Found(donors, self._thinnest, self._thickest, self._tallest, years)
 
-    def _distances(self, measures: TreeMeasures) -> NDArray[np.float64]:
+    def _distances(self, measures: TreeMeasures, steps: int) -> NDArray[np.float64]:
         """Give the squared difference in size of each wanted tree to each tree, (wanted, trees)."""
         wanted = self._wanted
         height = self._log_height[:, None] - np.log(measures.height_m)
@@ -218,7 +224,9 @@ class _Finder:
         dbh = np.where(np.isnan(wanted.dbh_cm)[:, None], 0.0, dbh)
         crown = (wanted.crown_base_m / wanted.height_m)[:, None]
         crown = np.nan_to_num(crown - measures.crown_base_m / measures.height_m)
-        squares = _HEIGHT * height**2 + _CROWN * crown**2
+        rank = wanted.rank[:, None] - measures.height_m / measures.height_m.max()
+        older = np.nan_to_num(np.log(wanted.age) - np.log(steps))[:, None]
+        squares = _HEIGHT * height**2 + _CROWN * crown**2 + _RANK * rank**2 + _AGE * older**2
         squares += _DBH * np.where(np.isnan(dbh), _NO_DBH, dbh) ** 2
         return np.where(measures.buds > 0, squares, np.inf)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from forest.inventory.nursery import Donor, Found, Wanted, search
 from forest.measure.trees import BREAST_HEIGHT_M
 from forest.mechanics.transplant import transplanted
 from forest.random import STREAM_NURSERY, uniforms
-from forest.scenario.inventory import Inventory
+from forest.scenario.inventory import Inventory, InventoryTree
 from forest.trees import table
 from forest.yearbook import Event
 
@@ -31,6 +31,8 @@ _MOST_STRETCH = 1.05
 _THINNER, _THICKER = 0.5, 1.5
 #: Recent years in which the ages of metamers are kept, beyond those in which they keep leaves.
 _RECENT_YEARS = 10
+#: How far around a tree those stand whose height it is compared with, m.
+_AROUND_M = 10.0
 #: Above 1.3 m by so little that float32 cannot lose it.
 _JUST_ABOVE = 1.0 + 1e-6
 
@@ -125,16 +127,7 @@ def settle(
         vigour_sd=np.zeros(len(stand.species)),
         seed_reserve_kg=np.zeros(len(stand.species)),
     )
-    wanted = Wanted(
-        *(
-            np.array([np.nan if v is None else v for v in values], np.float64)
-            for values in (
-                [tree.height_m for tree in planting.trees],
-                [tree.dbh_cm for tree in planting.trees],
-                [tree.crown_base_m for tree in planting.trees],
-            )
-        )
-    )
+    wanted = _wanted(scenario, planting.trees, x, y)
     donors: list[Donor | None] = [None] * len(x)
     for kind, name in enumerate(stand.species_names):
         mine = np.flatnonzero(species == kind)
@@ -169,6 +162,28 @@ def settle(
     )
     say(built.report())
     return built
+
+
+def _wanted(
+    scenario: Scenario,
+    trees: Sequence[InventoryTree],
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+) -> Wanted:
+    """Gather what is known of the measured trees, and how tall each is among those around it."""
+    from scipy.spatial import cKDTree
+
+    height, dbh, crown_base, age = (
+        np.array([np.nan if v is None else v for v in (getattr(t, key) for t in trees)], np.float64)
+        for key in ("height_m", "dbh_cm", "crown_base_m", "age")
+    )
+    size = scenario.plot.size_m
+    torus = scenario.plot.boundary == "periodic"
+    places = np.stack((x, y), axis=1)
+    reach = min(_AROUND_M, 0.49 * min(size)) if torus else _AROUND_M
+    around = cKDTree(places, boxsize=size if torus else None).query_ball_point(places, reach)
+    tallest = np.array([height[near].max() for near in around])
+    return Wanted(height, dbh, crown_base, age, height / tallest)
 
 
 class _Fitting:
