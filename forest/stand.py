@@ -79,6 +79,8 @@ class Stand:
         Wall time spent in each phase of the year so far.
     """
 
+    built: Built | None = None
+
     def __init__(self, scenario: Scenario, say: Callable[[str], None] = lambda _: None) -> None:
         self._start(scenario)
         if isinstance(scenario.planting, Inventory):
@@ -120,7 +122,6 @@ class Stand:
         self.losses: dict[int, Loss] = {}
         self.sample_ids: list[int] = []
         self.seconds: dict[str, float] = {}
-        self.built: Built | None = None
 
     # ------------------------------------------------------------------ the year
 

@@ -168,8 +168,8 @@ def sweep(
 def check(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     """Check a scenario and say in a few lines what it would grow.
 
-    Where it starts from an inventory the measured trees are built, which takes some seconds, to tell
-    how near they come.
+    Where it starts from an inventory, the measured trees are built to tell how near they come,
+    which takes some seconds.
 
     Examples:
 

@@ -1,4 +1,4 @@
-"""A nursery: hidden stands of one species, open-grown to dense, in which measured trees find theirs.
+"""A nursery: hidden stands of a species, open-grown to dense, in which measured trees find theirs.
 
 The stands grow by the scenario's own rules, with the species' own parameters, on level ground
 without weather. Each year every wanted tree looks whether a tree of the nursery is nearer to its

@@ -76,8 +76,8 @@ class Built(NamedTuple):
         stretch = self.built_height_m / self.donor_height_m
         thick = self.built_dbh_cm / self.donor_dbh_cm
         text = (
-            f"{len(self.tree_id)} trees built from {_distinct(self)} of the nursery; dbh and height "
-            f"as measured, lengths x {_middle(stretch)}"
+            f"{len(self.tree_id)} trees built from {_distinct(self)} of the nursery; dbh and "
+            f"height as measured, lengths x {_middle(stretch)}"
         )
         if not np.isnan(thick).all():
             text += f", diameters x {_middle(thick)}"
@@ -194,9 +194,7 @@ class _Fitting:
         self._rows = rows
         self.donors = donors
         seed, ids = stand.scenario.seed, rows.tree_id
-        self._azimuth = [
-            2.0 * np.pi * uniforms(seed, STREAM_NURSERY, int(i), 0, 0)[0] for i in ids
-        ]
+        self._azimuth = [2.0 * np.pi * uniforms(seed, STREAM_NURSERY, int(i), 0, 0)[0] for i in ids]
         self._ratio = np.ones(len(donors))
         self._metamers: list[dict[str, NDArray[Any]]] = []
 

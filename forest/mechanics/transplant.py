@@ -1,4 +1,4 @@
-"""The rods of a tree that is turned, stretched and thickened, and keeps its shape under its load."""
+"""The rods of a tree that is turned, stretched and thickened, and keeps its shape under load."""
 
 from __future__ import annotations
 

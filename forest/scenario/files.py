@@ -97,9 +97,7 @@ def read_stem_map(
     return trees
 
 
-def read_inventory(
-    file: str, numbers: tuple[str, ...], context: Any
-) -> list[dict[str, Any]]:
+def read_inventory(file: str, numbers: tuple[str, ...], context: Any) -> list[dict[str, Any]]:
     """Read the trees of an inventory; an empty cell is left out, and so is a dbh of 0.
 
     `numbers` are the columns that may be missing or empty; `age` is a whole number.

@@ -34,7 +34,10 @@ class InventoryTree(Table):
         None, "height; default: from the height curve", unit="m", ge=0.05, le=150
     )
     crown_base_m: float | None = quantity(
-        None, "height of the lowest living leaves; default: whatever such trees have", unit="m", ge=0
+        None,
+        "height of the lowest living leaves; default: whatever such trees have",
+        unit="m",
+        ge=0,
     )
     age: int | None = quantity(
         None, "years since it germinated; default: as the model needs", unit="year", ge=1, le=5000
@@ -86,7 +89,10 @@ class Inventory(Table):
         max_length=200,
     )
     trees: tuple[InventoryTree, ...] = quantity(
-        (), "the trees; they are read from the file if there are none", unit="", max_length=1_000_000
+        (),
+        "the trees; they are read from the file if there are none",
+        unit="",
+        max_length=1_000_000,
     )
 
 
