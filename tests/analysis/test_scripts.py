@@ -23,6 +23,7 @@ SCRIPTS = {
     "social_classes": "slenderness",
     "growth_dominance": "gini_volume",
     "self_thinning": "slope",
+    "climate_rings": "driest_year",
 }
 
 
@@ -50,6 +51,7 @@ def test_a_script_starts_as_a_file(dense_run: Run, tmp_path: Path) -> None:
     ("name", "says"),
     [
         ("ring_series", "has no rings at 1.3 m"),
+        ("climate_rings", "has no rings at 1.3 m"),
         ("pressler", "has no tree with 3 discs below its crown"),
         ("diameter_distribution", "has no year with 15 trees that have a dbh"),
         ("social_classes", "has no tree of 1.3 m"),
