@@ -99,7 +99,8 @@ def draw(start: pd.DataFrame, end: pd.DataFrame, run: forest.Run) -> Figure:
     size_m = run.scenario.plot.size_m
     draw_map(left, start, size_m, f"start of {run.years[0]}: {len(start)} trees")
     draw_map(middle, end, size_m, f"end of {run.years[-1]}: {len(end)} trees")
-    edges = np.arange(0.0, np.nanmax(end["dbh_cm"]) + 2.0 * CLASS_CM, CLASS_CM)
+    thickest = max(np.nanmax(start["dbh_cm"]), np.nanmax(end["dbh_cm"]))
+    edges = np.arange(-0.5, thickest / CLASS_CM + 1.5) * CLASS_CM  # whole centimetres amid classes
     for trees, label, style in ((start, "measured", "0.6"), (end, "simulated", "tab:green")):
         right.hist(trees["dbh_cm"].dropna(), edges, color=style, alpha=0.6, label=label)
     right.set(xlabel="dbh, cm", ylabel=f"trees per class of {CLASS_CM:g} cm")

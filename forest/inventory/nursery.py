@@ -1,8 +1,8 @@
 """A nursery: hidden stands of a species, open-grown to dense, in which measured trees find theirs.
 
 The stands grow by the scenario's own rules, with the species' own parameters, on its site and level
-ground; all years are alike. Each year every wanted tree looks whether a tree of the nursery is nearer
-to its size than the one it has found before. So only trees that are wanted are ever kept.
+ground; all years are alike. Each year every wanted tree looks whether a tree of the nursery is
+nearer to its size than the one it has found before. So only trees that are wanted are ever kept.
 """
 
 from __future__ import annotations
