@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.dynamics.acts import acts_of
+from forest.dynamics.snags import is_left
 from forest.errors import InputError, nearest
 from forest.record.schema import CAUSES
 from forest.scenario.acts import Branches
@@ -95,6 +96,8 @@ def fell(stand: Stand, tree_ids: Sequence[int], cause: str) -> None:
     rows = [stand.row_of(tree_id) for tree_id in tree_ids]
     measures = stand.measure()
     alive = np.ones(len(stand.rows.tree_id), np.bool_)
+    if stand.dead_wood is not None and is_left("felled", cause):
+        stand.dead_wood.leave(stand, list(dict.fromkeys(rows)), measures)
     for row in rows:
         if alive[row]:
             stand.pending.append(Event.of(stand, row, "felled", cause, measures))

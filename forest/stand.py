@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest import establishment, management
-from forest.dynamics.mortality import Death, starved
+from forest.dynamics import mortality
+from forest.dynamics.mortality import Death
 from forest.dynamics.planting import headings
+from forest.dynamics.snags import DeadWood
 from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
@@ -30,7 +32,14 @@ from forest.scenario.inventory import Inventory
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.yearbook import Event, Loss, YearRecord, record_year, sample_serials
+from forest.yearbook import (
+    Event,
+    Loss,
+    YearRecord,
+    record_year,
+    sample_serials,
+    snag_columns,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,6 +84,8 @@ class Stand:
         Light and space.
     built : Built or None
         How near the first trees are to the inventory that they were built from.
+    dead_wood : DeadWood or None
+        Snags and lying dead wood, where the scenario has snags.
     memories : dict of str to Memory
         The parts that remember something between years, for checkpoints.
     seconds : dict of str to float
@@ -94,6 +105,7 @@ class Stand:
         )
         establishment.establish(self, first, "planted", self._traits)
         management.check_due(self)  # what cannot be done in the first year is refused before it
+        mortality.check_due(self)
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -116,6 +128,10 @@ class Stand:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
             plot = Plot(*scenario.plot.size_m, scenario.plot.boundary == "periodic")
             self.mechanics = Mechanics(spec, self.species, self.pipe_exponent, plot)
+        self.dead_wood: DeadWood | None = None
+        if scenario.mortality.snags:
+            self.dead_wood = DeadWood(self.species, scenario.seed)
+            self.memories["deadwood"] = self.dead_wood
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -138,6 +154,7 @@ class Stand:
         """
         self._clock = time.perf_counter()
         self.climate.check_known(self.year + 1)
+        mortality.check_due(self)
         management.act(self, self._traits.of["branch_pipe"])
         self._lap("act")
         self.steps += 1
@@ -161,7 +178,10 @@ class Stand:
         return record
 
     def _expose(self) -> None:
-        self.surroundings.expose(self.arena.metamers, self.rows, self.steps)
+        dead = None
+        if self.dead_wood is not None:
+            dead = self.dead_wood.plant_area(self.steps, self.surroundings.voxel_m)
+        self.surroundings.expose(self.arena.metamers, self.rows, self.steps, dead)
         self._lap("expose")
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
@@ -250,9 +270,9 @@ class Stand:
             self._full_light,
             self._ring_heights,
         )
-        deaths: list[Death] = []
-        if not self._paper:
-            deaths = starved(self.rows, measures.buds, self._traits.of["suppression_years"])
+        deaths = mortality.deaths_of(self, measures)
+        if self.dead_wood is not None:
+            self.dead_wood.pass_year(self, deaths, measures)
         self._lap("measure")
         return measures, deaths
 
@@ -394,6 +414,13 @@ class Stand:
         }
         columns.update(measures.columns())
         return pd.DataFrame(columns)
+
+    @property
+    def snags(self) -> pd.DataFrame:
+        """The dead trees that stand now, a row each; none where the scenario has no snags."""
+        import pandas as pd
+
+        return pd.DataFrame(snag_columns(self))
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""

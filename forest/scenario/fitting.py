@@ -11,6 +11,7 @@ from forest.scenario.climate import check_covered
 from forest.scenario.complete import check_spots
 from forest.scenario.inventory import Inventory
 from forest.scenario.model import Explicit, Random, Regular
+from forest.scenario.mortality import check_mortality
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -30,6 +31,13 @@ def check_fit(scenario: Scenario) -> None:
     _trees_fit(scenario)
     check_covered(scenario.climate, scenario.calendar)
     check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
+    check_mortality(
+        scenario.mortality,
+        mechanics=scenario.mechanics is not None,
+        plot=scenario.plot,
+        species=scenario.species,
+        years=scenario.calendar,
+    )
 
 
 def _wind_has_a_price(scenario: Scenario) -> None:

@@ -19,7 +19,9 @@ _Extent = Annotated[float, Field(gt=0, le=1e5)]
 _DiscHeight = Annotated[float, Field(gt=0, le=150)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
-_TableName = Literal["trees", "stand", "events", "rings", "carbon", "stability", "climate"]
+_TableName = Literal[
+    "trees", "stand", "events", "rings", "carbon", "stability", "climate", "deadwood"
+]
 
 
 class Plot(Table):
@@ -359,10 +361,11 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        ("trees", "stand", "events", "rings", "carbon", "stability", "climate"),
-        "tables to write; stability only has rows where there is a table mechanics",
+        ("trees", "stand", "events", "rings", "carbon", "stability", "climate", "deadwood"),
+        "tables to write; stability only has rows where there is a table mechanics, deadwood "
+        "where there are snags",
         unit="",
-        max_length=7,
+        max_length=8,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(
