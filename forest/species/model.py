@@ -193,6 +193,14 @@ class Carbon(Table):
         ge=0,
         le=10000,
     )
+    turgor_limit_m: float = quantity(
+        0.0,
+        "height at which water tension leaves new internodes no length: they shorten linearly "
+        "towards it (Koch et al. 2004); 0 = off",
+        unit="m",
+        ge=0,
+        le=10000,
+    )
     first_pipe_diameter_m: float = quantity(
         0.001, "diameter of a new metamer's pipe to the ground; 0 = free", unit="m", ge=0, le=0.05
     )
