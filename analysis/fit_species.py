@@ -15,41 +15,19 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from analysis.fit_targets import GOALS, Goal, Target, grow_towards  # noqa: E402
-from analysis.self_thinning import thinning_slope  # noqa: E402
+from analysis.fit_page import write_page  # noqa: E402
+from analysis.fit_stand import grow_towards, misfit  # noqa: E402
+from analysis.fit_targets import GOALS, Goal  # noqa: E402
 from forest.species import load_species  # noqa: E402
 
 FILES = ROOT / "forest" / "species"
 
-#: What a target that the stand did not live to see counts, in tolerances.
-_MISSED = 5.0
 _FIRST_STEP = 0.12  # of the way between a parameter's bounds
-
-
-def model(table: pd.DataFrame, target: Target) -> float:
-    """Give a stand's number for a target; NaN if it did not live so long."""
-    if target.column == "thinning_slope":
-        return thinning_slope(table) if len(table) > 1 else float("nan")
-    return float(table[target.column].get(target.age, float("nan")))
-
-
-def residual(table: pd.DataFrame, target: Target) -> float:
-    """Give ln(model / target) in tolerances."""
-    ratio = model(table, target) / target.value
-    if not ratio > 0.0:
-        return _MISSED
-    return float(np.clip(np.log(ratio) / target.tolerance, -_MISSED, _MISSED))
-
-
-def misfit(tables: Sequence[pd.DataFrame], targets: Sequence[Target]) -> float:
-    """Give the mean square of the residuals over stands and targets."""
-    return float(np.mean([[residual(t, target) ** 2 for target in targets] for t in tables]))
 
 
 def present(species: str, goal: Goal) -> NDArray[np.float64]:
@@ -131,6 +109,9 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=1, help="stands grown for each trial")
     parser.add_argument("--write", action="store_true", help="put what is found into the file")
     asked = parser.parse_args(words)
+    if asked.species is None:
+        write_page()
+        return
     seeds = range(1, asked.seeds + 1)
     values, before, after = fit(asked.species, asked.evaluations, asked.plot, seeds)
     for key, value in values.items():

@@ -1,4 +1,4 @@
-"""What each species is fitted to: yield tables and pattern figures, and the stand that is grown.
+"""What each species is fitted to: yield tables and pattern figures.
 
 Yield tables stand in `analysis/data`. A pattern figure is what foresters expect of any such stand;
 its tolerance says how sharply it is meant.
@@ -12,10 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-
-import forest
 
 DATA = Path(__file__).resolve().parent / "data"
 
@@ -26,19 +23,20 @@ TOLERANCE = {
     "basal_area_m2ha": 0.25,
     "n_ha": 0.35,
 }
-#: A tree thinner than this, m, is no part of the stand that Reineke's rule is about.
-_FIRST_THINNING = 30  # age from which a stand is thinned towards its table
-_EVERY = 5  # years between thinnings
 
 
 @dataclass(frozen=True)
 class Target:
-    """A number that a stand is to have at an age (0: over all its life); see `Goal.model`."""
+    """A number that a stand is to have at an age (0: over all its life).
+
+    `side` is 1 for a ceiling and -1 for a floor: then only what is beyond it counts.
+    """
 
     age: int
     column: str
     value: float
     tolerance: float
+    side: int = 0
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class Free:
         place = min(max(place, 0.0), 1.0)
         if self.low > 0.0:
             return float(f"{self.low * (self.high / self.low) ** place:.3g}")
-        return round(self.low + (self.high - self.low) * place, 4)
+        return round(float(self.low + (self.high - self.low) * place), 4)
 
     def place(self, value: float) -> float:
         """Give the place of a value between the bounds."""
@@ -120,6 +118,17 @@ _ASSMANN, ASSMANN = yield_table("assmann_franz_spruce.csv")
 #: Reineke's slope and half its usual range.
 _SLOPE = Target(0, "thinning_slope", -1.6, 0.2)
 
+
+def _slenderness(floor: float) -> Target:
+    """Height per diameter of an open-grown tree of 10 cm (Vospernik et al. 2010)."""
+    return Target(0, "open_slenderness", floor, 0.1, side=-1)
+
+
+def _densest(index: float) -> Target:
+    """Reineke's index that a stand does not pass."""
+    return Target(0, "sdi", index, 0.05, side=1)
+
+
 _FREE = (
     Free("bud_fate.alpha", 0.8, 5.0),
     Free("bud_fate.apical_bias", 0.49, 0.58),
@@ -146,6 +155,8 @@ GOALS = {
             *pattern("lai", 0.15, {40: 3.5, 60: 3.5, 80: 3.5}),
             *pattern("floor_light", 0.15, {40: 0.12, 60: 0.12, 80: 0.12}),
             _SLOPE,
+            _densest(1008.0),
+            _slenderness(58.0),
         ),
         free=(*_FREE, Free("leaves.sla_m2_kg", 4.0, 12.0)),
     ),
@@ -158,6 +169,8 @@ GOALS = {
             *of_table(ASSMANN, ["top_height_m", "qmd_cm", "basal_area_m2ha"]),
             *pattern("lai", 0.15, {40: 9.0, 60: 8.5, 80: 8.0, 100: 7.5}),
             *pattern("floor_light", 0.4, {40: 0.025, 60: 0.025, 80: 0.03}),
+            _densest(1018.0),
+            _slenderness(66.0),
         ),
         free=(*_FREE, Free("leaves.sla_m2_kg", 4.0, 9.0)),
         thinned=ASSMANN,
@@ -174,6 +187,7 @@ GOALS = {
             *pattern("lai", 0.1, {40: 5.5, 80: 5.5, 120: 5.5}),
             *pattern("floor_light", 0.3, {40: 0.033, 80: 0.033, 120: 0.035}),
             _SLOPE,
+            _slenderness(60.0),
         ),
         free=_FREE,
     ),
@@ -189,6 +203,7 @@ GOALS = {
             *pattern("lai", 0.15, {20: 2.5, 40: 2.5, 60: 2.3, 80: 2.1}),
             *pattern("floor_light", 0.2, {40: 0.23, 60: 0.25, 80: 0.28}),
             _SLOPE,
+            _slenderness(60.0),
         ),
         free=(*_FREE, Free("leaves.sla_m2_kg", 10.0, 25.0)),
     ),
@@ -203,65 +218,8 @@ GOALS = {
             *pattern("lai", 0.1, {40: 4.5, 80: 4.5, 120: 4.3}),
             *pattern("floor_light", 0.3, {40: 0.07, 80: 0.08, 120: 0.09}),
             _SLOPE,
+            _slenderness(60.0),
         ),
         free=(*_FREE, Free("leaves.sla_m2_kg", 10.0, 25.0)),
     ),
 }
-
-
-def number_at(table: pd.DataFrame, age: float) -> float:
-    """Give a table's N per ha at an age, straight on doubly logarithmic paper, also before it."""
-    ages, numbers = np.log(table.index.to_numpy(float)), np.log(table["n_ha"].to_numpy())
-    at = math.log(age)
-    if at < ages[0]:
-        slope = (numbers[1] - numbers[0]) / (ages[1] - ages[0])
-        return float(np.exp(numbers[0] + slope * (at - ages[0])))
-    return float(np.exp(np.interp(at, ages, numbers)))
-
-
-def thin_from_below(stand: forest.Stand, n_ha: float) -> None:
-    """Fell the thinnest trees until n_ha are left."""
-    trees = stand.trees.fillna({"dbh_cm": 0.0}).sort_values(["dbh_cm", "height_m"])
-    width, depth = stand.scenario.plot.size_m
-    surplus = len(trees) - round(n_ha * width * depth / 1e4)
-    if surplus > 0:
-        stand.fell([int(i) for i in trees["tree_id"].iloc[:surplus]], "thinning")
-
-
-def scenario_of(
-    species: str, goal: Goal, plot_m: float, seed: int, values: Mapping[str, float]
-) -> forest.Scenario:
-    """Give the scenario of a goal's stand with these parameters, `section.key`: value."""
-    return forest.Scenario.from_toml(
-        "\n".join(
-            [
-                f"years = {goal.years}",
-                f"seed = {seed}",
-                f"[plot]\nsize_m = [{plot_m}, {plot_m}]\nboundary = 'periodic'",
-                f"[site]\nlatitude_deg = {goal.latitude_deg}",
-                "[environment.shadow]\n[environment.canopy]",
-                f"[species.{species}]",
-                f"[planting]\nkind = 'random'\ndensity_ha = {goal.density_ha}",
-            ]
-        ),
-        where=f"fit of {species}",
-    ).with_overrides([f"species.{species}.{key}={value!r}" for key, value in values.items()])
-
-
-def grow_towards(
-    species: str, goal: Goal, plot_m: float, seed: int, values: Mapping[str, float]
-) -> pd.DataFrame:
-    """Grow a goal's stand, thinned where the goal is; give its stand table by age."""
-    stand = forest.Stand(scenario_of(species, goal, plot_m, seed, values))
-    rows = []
-    for age in range(1, goal.years + 1):
-        table = goal.thinned
-        if table is not None and age >= _FIRST_THINNING and age % _EVERY == 0:
-            thin_from_below(stand, number_at(table, age))
-        columns = stand.step().tables["stand"]
-        rows.append({name: column[-1] for name, column in columns.items()})
-        if not len(stand.rows.tree_id):
-            break
-    grown = pd.DataFrame(rows)
-    grown.index = pd.RangeIndex(1, len(grown) + 1, name="age")
-    return grown

@@ -22,6 +22,7 @@ from forest.growth.budget import (
     UPKEEP,
     affordable_scale,
     extension,
+    light_response,
     path_lengths,
     site_income,
 )
@@ -237,7 +238,9 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
         sites = (1 if state & TERMINAL else 0) + (1 if state & LATERAL else 0)
         if sites == 0:
             continue
-        earned = site_income(np.float64(arena.light[i]), path[k], rate, t.of[sp].hydraulic_length)
+        light = np.float64(arena.light[i])
+        light = light_response(light, year.full_light, t.of[sp].light_half)
+        earned = site_income(light, path[k], rate, t.of[sp].hydraulic_length)
         income += sites * earned
         leaves += sites * leaf
         if earned < leaf + minimal * pipe_path[k]:

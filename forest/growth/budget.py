@@ -49,6 +49,19 @@ def path_lengths(parent, order, length, branch_pipe, path, pipe_path):  # type: 
 
 
 @njit
+def light_response(light, full_light, half):  # type: ignore[no-untyped-def]
+    """What leaves make of their light, as light that counts fully: all of it, or a saturating share.
+
+    Leaves earn l (1 + c) / (l + c) of what they earn in full light, l being their share of it
+    (Pacala et al. 1996, G1 l / (G1 / S + l)); the smaller the `half` c, the less they lose in shade.
+    """
+    if half <= 0.0:
+        return light
+    at = half * full_light
+    return light * (full_light + at) / (light + at)
+
+
+@njit
 def site_income(light, path, rate, hydraulic_length):  # type: ignore[no-untyped-def]
     """Income of one site, kg: light times rate, less with height (Ryan & Yoder 1997)."""
     return rate * light / (1.0 + path / hydraulic_length)

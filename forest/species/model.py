@@ -172,6 +172,14 @@ class Carbon(Table):
     light_use_efficiency_kg_m2: float = quantity(
         1.3, "yearly income per leaf area at full light (epsilon)", unit="kg/m2", gt=0, le=20
     )
+    light_half_saturation: float = quantity(
+        0.0,
+        "light, as a share of full light, at which leaves earn half of what endless light would "
+        "give; the less, the more tolerant of shade (Pacala et al. 1996); 0 = income in proportion "
+        "to light",
+        ge=0,
+        le=100,
+    )
     maintenance_per_year: float = quantity(
         0.01, "upkeep as a share of the sapwood's mass", unit="1/year", ge=0, le=1
     )
