@@ -142,6 +142,8 @@ _FREE = (
     Free("carbon.turgor_limit_m", 22.0, 70.0),
     Free("carbon.first_pipe_diameter_m", 0.0003, 0.0015),
     Free("carbon.suppression_ratio", -0.5, 0.4),
+    Free("carbon.vigour_sd", 0.05, 0.3),
+    Free("carbon.seed_reserve_kg", 0.00005, 0.002),
 )
 
 GOALS = {

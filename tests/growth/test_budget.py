@@ -16,6 +16,7 @@ from forest.growth.budget import (
     UPKEEP,
     affordable_scale,
     extension,
+    light_response,
     lowest_scale,
     path_lengths,
     threshold_bin,
@@ -54,6 +55,19 @@ def test_path_lengths(seed: int, kappa: float) -> None:
     for node in read_plant(m, trees, 0):
         np.testing.assert_allclose(path[node.index], slow.path(node), rtol=1e-5)
         np.testing.assert_allclose(pipe_path[node.index], slow.pipe_path(node, kappa), rtol=1e-5)
+
+
+@given(st.floats(0.0, 1.0), st.sampled_from([0.0, 0.3, 2.0]), st.sampled_from([1.0, 4.0]))
+def test_light_response(share: float, half: float, full: float) -> None:
+    """Full light counts fully, shade by more than its share; without a half, by its share."""
+    traits = make_traits(make_species(carbon={"light_half_saturation": half}))
+    prices = prices_of(traits, 1.0, make_year(full_light=full))
+    counted = light_response(share * full, full, half)
+    np.testing.assert_allclose(counted, slow.response(share * full, prices), rtol=1e-12)
+    np.testing.assert_allclose(light_response(full, full, half), full, rtol=1e-12)
+    assert counted >= share * full * (1.0 - 1e-12)
+    if half == 0.0:
+        assert counted == share * full
 
 
 @given(st.floats(0.0, 100.0), st.sampled_from([5.0, 40.0, np.inf]))
@@ -122,13 +136,14 @@ def _allocated(m, trees, traits, year):  # type: ignore[no-untyped-def]
     return accounts
 
 
-@given(seeds, st.sampled_from([0.0, 0.3, 1.0]))
-def test_yearly_accounts(seed: int, factor: float) -> None:
+@given(seeds, st.sampled_from([0.0, 0.3, 1.0]), st.sampled_from([0.0, 0.5]))
+def test_yearly_accounts(seed: int, factor: float, half: float) -> None:
     """Income, leaves and upkeep site by site; the reserve takes what is not spent."""
     m, trees = random_arena(np.random.default_rng(seed), 3, 25)
     reserve = trees.reserve.copy()
     bad = trees.bad_years.copy()
-    traits, year = make_traits(TREE), make_year(income_factor=factor)
+    tree = make_species(carbon={"light_half_saturation": half})
+    traits, year = make_traits(tree), make_year(income_factor=factor)
     books = [
         slow.books(read_plant(m, trees, r), prices_of(traits, float(trees.vigour[r]), year))
         for r in range(3)
