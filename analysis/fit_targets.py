@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
@@ -131,7 +131,7 @@ def _densest(index: float) -> Target:
 
 _FREE = (
     Free("bud_fate.alpha", 0.8, 5.0),
-    Free("bud_fate.apical_bias", 0.49, 0.58),
+    Free("bud_fate.apical_bias", 0.49, 0.6),
     Free("shedding.light_per_internode", 0.005, 0.2),
     Free("leaves.area_m2", 0.008, 0.04),
     Free("carbon.light_use_efficiency_kg_m2", 0.25, 2.0),
@@ -144,6 +144,11 @@ _FREE = (
     Free("carbon.suppression_ratio", -0.5, 0.4),
     Free("carbon.vigour_sd", 0.05, 0.3),
     Free("carbon.seed_reserve_kg", 0.00005, 0.002),
+)
+
+#: A conifer's stem stays straight and its limbs side branches only above this apical bias.
+_STRAIGHT = tuple(
+    replace(free, low=0.535) if free.key == "bud_fate.apical_bias" else free for free in _FREE
 )
 
 GOALS = {
@@ -160,7 +165,7 @@ GOALS = {
             _densest(1008.0),
             _slenderness(58.0),
         ),
-        free=(*_FREE, Free("leaves.sla_m2_kg", 4.0, 12.0)),
+        free=(*_STRAIGHT, Free("leaves.sla_m2_kg", 4.0, 12.0)),
     ),
     "picea_abies": Goal(
         source=_ASSMANN,
@@ -174,7 +179,7 @@ GOALS = {
             _densest(1018.0),
             _slenderness(66.0),
         ),
-        free=(*_FREE, Free("leaves.sla_m2_kg", 4.0, 9.0)),
+        free=(*_STRAIGHT, Free("leaves.sla_m2_kg", 4.0, 9.0)),
         thinned=ASSMANN,
     ),
     "fagus_sylvatica": Goal(
