@@ -267,9 +267,9 @@ def write_page() -> None:
         "−1.3 and −2.0, his index below 1.2 times the published maximum.\n",
         self_thinned(unthinned),
         "## Spacing\n",
-        f"{_SPACING_M:g} × {_SPACING_M:g} m, one seed, at {_SPACING_AGE} years. Wider spacing is to "
-        "give stockier trees, thicker branches and deeper crowns; suppressed trees are to be more "
-        "slender than dominant ones (Vospernik et al. 2010).\n",
+        f"{_SPACING_M:g} × {_SPACING_M:g} m, one seed, at {_SPACING_AGE} years. Wider "
+        "spacing is to give stockier trees, thicker branches and deeper crowns; suppressed "
+        "trees are to be more slender than dominant ones (Vospernik et al. 2010).\n",
         spacing_trial(),
         "## A mixture\n",
         _mixture_text(mixed),

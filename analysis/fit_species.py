@@ -9,6 +9,7 @@ the values in the files and docs/fit.md is written.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -73,29 +74,38 @@ def search(
 def fit(
     species: str, evaluations: int, plot_m: float, seeds: Sequence[int]
 ) -> tuple[dict[str, float], float, float]:
-    """Fit a species; give its parameters and the misfit before and after."""
+    """Fit a species; give its parameters and the misfit before and after.
+
+    Ctrl-C ends the search with the best so far.
+    """
     goal = GOALS[species]
     costs: list[float] = []
+    best = start = present(species, goal)
 
     def cost(places: NDArray[np.float64]) -> float:
+        nonlocal best
         values = values_at(goal, places)
         tables = [grow_towards(species, goal, plot_m, seed, values) for seed in seeds]
         costs.append(misfit(tables, goal.targets))
         if costs[-1] <= min(costs):
+            best = places.copy()
             print(f"{len(costs):4d}  misfit {costs[-1]:.3f}", file=sys.stderr, flush=True)
         return costs[-1]
 
-    best = search(cost, present(species, goal), evaluations)
+    with contextlib.suppress(KeyboardInterrupt):
+        search(cost, start, evaluations)
     return values_at(goal, best), costs[0], min(costs)
 
 
-def write_values(file: Path, values: Mapping[str, float]) -> None:
-    """Put parameters, `section.key`: value, into a species file."""
+def write_values(file: Path, values: Mapping[str, float], source: str) -> None:
+    """Put parameters, `section.key`: value, into a species file, and what they were fitted to."""
     text = file.read_text(encoding="utf-8")
+    told = f"fitted by analysis/fit_species.py to {source}"
     for name, value in values.items():
         section, key = name.split(".")
         head, rest = text.split(f"[{section}]\n", 1)
         rest = re.sub(rf"^{key} = .*$", f"{key} = {value!r}", rest, count=1, flags=re.MULTILINE)
+        rest = re.sub(rf'^{name} = ".*$', f'{name} = "{told}"', rest, count=1, flags=re.MULTILINE)
         text = f"{head}[{section}]\n{rest}"
     file.write_text(text, encoding="utf-8")
 
@@ -118,7 +128,7 @@ def main(words: Sequence[str] | None = None) -> None:
         print(f"{key} = {value!r}")
     print(f"misfit {before:.3f} before, {after:.3f} after")
     if asked.write:
-        write_values(FILES / f"{asked.species}.toml", values)
+        write_values(FILES / f"{asked.species}.toml", values, GOALS[asked.species].source)
 
 
 if __name__ == "__main__":

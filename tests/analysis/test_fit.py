@@ -132,7 +132,7 @@ def test_only_the_named_values_change(tmp_path: Path) -> None:
     copy = tmp_path / "pine.toml"
     text = source.read_text(encoding="utf-8")
     copy.write_text(text, encoding="utf-8")
-    write_values(copy, {"carbon.vigour_sd": 0.123, "leaves.area_m2": 0.0111})
+    write_values(copy, {"carbon.vigour_sd": 0.123, "leaves.area_m2": 0.0111}, "a table")
     changed = [
         new
         for old, new in zip(
@@ -140,7 +140,13 @@ def test_only_the_named_values_change(tmp_path: Path) -> None:
         )
         if old != new
     ]
-    assert changed == ["area_m2 = 0.0111", "vigour_sd = 0.123"]
+    told = "fitted by analysis/fit_species.py to a table"
+    assert changed == [
+        "area_m2 = 0.0111",
+        "vigour_sd = 0.123",
+        f'leaves.area_m2 = "{told}"',
+        f'carbon.vigour_sd = "{told}"',
+    ]
     assert load_species("pinus_sylvestris").carbon.vigour_sd != 0.123
 
 
