@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from forest import management
-from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
-from forest.dynamics.weather import income_factor
+from forest import establishment, management
+from forest.dynamics.mortality import Death, starved
+from forest.dynamics.planting import headings
+from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
 from forest.growth.allocate import allocate
@@ -19,15 +20,15 @@ from forest.growth.dealing import Deal, Workbench, deal
 from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
-from forest.growth.shoots import extend, shooting_buds, sprout
+from forest.growth.shoots import extend, shooting_buds
 from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
-from forest.stand_state import put_state, take_state
+from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.yearbook import Event, Loss, YearRecord, record_year
+from forest.yearbook import Event, Loss, YearRecord, record_year, sample_serials
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,16 +65,22 @@ class Stand:
         Id of the next tree.
     mechanics : Mechanics or None
         What bends and holds the trees, where the scenario has mechanics.
+    climate : Climate
+        What each year is like, and what the species make of it.
     surroundings : Surroundings
         Light and space.
+    memories : dict of str to Memory
+        The parts that remember something between years, for checkpoints.
     seconds : dict of str to float
         Wall time spent in each phase of the year so far.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self._start(scenario)
-        x, y, species = scenario.planting_positions()
-        self._plant(x, y, species, headings(*scenario.planting_leans()))
+        first = establishment.Newcomers.planted(
+            *scenario.planting_positions(), headings(*scenario.planting_leans())
+        )
+        establishment.establish(self, first, "planted", self._traits)
         management.check_due(self)  # what cannot be done in the first year is refused before it
 
     def _start(self, scenario: Scenario) -> None:
@@ -89,7 +96,9 @@ class Stand:
         self._ring_heights = np.array(scenario.output.ring_heights_m, np.float64)
         self._pipes_before = np.empty(0, np.float32)
         self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
+        self.memories: dict[str, Memory] = {"surroundings": self.surroundings}
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
@@ -112,17 +121,18 @@ class Stand:
 
         Raises
         ------
-        ActError
-            If an act cannot be done; then the stand is as it was.
+        InputError
+            If an act cannot be done, or the climate ends before; then the stand is as it was.
         """
         self._clock = time.perf_counter()
+        self.climate.check_known(self.year + 1)
         management.act(self, self._traits.of["branch_pipe"])
         self._lap("act")
         self.steps += 1
-        year = self._year()
+        year = self.growth_year()
         accounts = np.zeros((len(self.rows.tree_id), budget.ACCOUNTS))
         shared = deal(self.rows.size)
-        before = self._sample_serials()
+        before = sample_serials(self)
         self._lap("deal")
 
         self._expose()
@@ -132,9 +142,9 @@ class Stand:
         rings = self._note_pipes()
         self._thicken(shared, year, accounts)
         self._bend()
-        measures, dead = self._die()
-        record = record_year(self, measures, dead, accounts, before, rings)
-        self._bury(dead, measures)
+        measures, deaths = self._die()
+        record = record_year(self, measures, deaths, accounts, before, rings)
+        self._bury(deaths, measures)
         self._lap("record")
         return record
 
@@ -219,8 +229,8 @@ class Stand:
             self.mechanics.bend(self.arena, self.rows, self.steps, around.solid, around.voxel_m)
             self._lap("bend")
 
-    def _die(self) -> tuple[TreeMeasures, list[tuple[int, str]]]:
-        """Measure all trees; name the rows of those that die, with the cause."""
+    def _die(self) -> tuple[TreeMeasures, list[Death]]:
+        """Measure all trees; tell which die, in order of rows."""
         measures = measure_trees(
             self.arena.metamers,
             self.rows,
@@ -228,36 +238,28 @@ class Stand:
             self._full_light,
             self._ring_heights,
         )
-        dead: list[tuple[int, str]] = []
+        deaths: list[Death] = []
         if not self._paper:
-            limit = self._traits.of["suppression_years"][self.rows.species]
-            suppressed = self.rows.bad_years >= limit
-            for row in np.flatnonzero(suppressed | (measures.buds == 0)):
-                dead.append((int(row), "suppression" if suppressed[row] else "no_buds"))
+            deaths = starved(self.rows, measures.buds, self._traits.of["suppression_years"])
         self._lap("measure")
-        return measures, dead
+        return measures, deaths
 
-    def _bury(self, dead: list[tuple[int, str]], measures: TreeMeasures) -> None:
+    def _bury(self, deaths: list[Death], measures: TreeMeasures) -> None:
         remember_discs(self.rows, self.arena.metamers, measures)
         self.pending = []
         self.losses = {}
-        if dead:
+        if deaths:
             alive = np.ones(len(self.rows.tree_id), np.bool_)
-            alive[[row for row, _ in dead]] = False
+            alive[[death.row for death in deaths]] = False
             self.rows = table.keep(self.rows, alive)
 
-    def _year(self) -> Year:
+    def growth_year(self) -> Year:
+        """Tell growth what it must know of the current step."""
         s = self.scenario
-        factor = income_factor(
-            self.year,
-            s.seed,
-            s.weather.noise_sd,
-            [(e.year, e.factor) for e in s.weather.extreme_years],
-        )
         return Year(
             step=self.steps,
             seed=s.seed,
-            income_factor=factor * s.site.productivity,
+            income_factor=self.climate.factors(self.year) * s.site.productivity,
             full_light=self._full_light,
             paper=self._paper,
             balance=s.growth.bud_fate == "balance",
@@ -296,49 +298,7 @@ class Stand:
         list of int
             The new trees' ids.
         """
-        names = [species] * len(x) if isinstance(species, str) else list(species)
-        at = np.asarray(x, np.float64), np.asarray(y, np.float64)
-        width, depth = self.scenario.plot.size_m
-        check_planting(*at, names, (width, depth), self.species_names)
-        leans = check_leans(len(x), lean_deg, lean_azimuth_deg)
-        if self.scenario.plot.boundary == "periodic":
-            at = at[0] % width, at[1] % depth
-        first = self.next_id
-        codes = np.array([self.species_names.index(name) for name in names], np.int16)
-        self._plant(*at, codes, headings(*leans))
-        return list(range(first, self.next_id))
-
-    def _plant(
-        self,
-        x: NDArray[np.float64],
-        y: NDArray[np.float64],
-        species: NDArray[Any],
-        heading: NDArray[np.float64],
-    ) -> None:
-        more = seedlings(
-            x,
-            y,
-            species,
-            first_id=self.next_id,
-            step=self.steps,
-            seed=self.scenario.seed,
-            voxel_m=self.surroundings.voxel_m,
-            vigour_sd=np.array([s.carbon.vigour_sd for s in self.species]),
-            seed_reserve_kg=np.array([s.carbon.seed_reserve_kg for s in self.species]),
-        )
-        first_row = len(self.rows.tree_id)
-        self.next_id += len(more.tree_id)
-        self.rows = table.append(self.rows, more)
-        rows = self.rows
-        wanted = rows.size.astype(np.int64)
-        wanted[first_row:] = 1
-        self.arena.make_room(rows.start, rows.size, rows.room, wanted)
-        sprout(self.arena.metamers, rows, first_row, heading, self._traits, self._year())
-        for field in self.arena.companions:
-            field[rows.start[first_row:]] = 0  # they get their rods with their first year
-        measures = self.measure()
-        for row in range(first_row, len(rows.tree_id)):
-            self.pending.append(Event.of(self, row, "planted", "none", measures))
+        return establishment.plant(self, x, y, species, lean_deg, lean_azimuth_deg, self._traits)
 
     def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> None:
         """Fell trees: they are gone at once, with an event in the next year's record.
@@ -461,16 +421,6 @@ class Stand:
     def row_of(self, tree_id: int) -> int:
         """Find the row of a living tree."""
         return table.row_of(self.rows, tree_id, where="Stand")
-
-    def _sample_serials(self) -> dict[int, NDArray[np.int32]]:
-        """Serials of the sample trees' metamers before the year, to tell what was shed."""
-        serials = {}
-        for tree_id in self.sample_ids:
-            row = int(np.searchsorted(self.rows.tree_id, tree_id))
-            if row < len(self.rows.tree_id) and self.rows.tree_id[row] == tree_id:
-                start, size = int(self.rows.start[row]), int(self.rows.size[row])
-                serials[tree_id] = self.arena.metamers.serial[start : start + size].copy()
-        return serials
 
     # ------------------------------------------------------------------ checkpoints
 

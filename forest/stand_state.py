@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,16 @@ if TYPE_CHECKING:
     from forest.stand import Stand
 
 
+class Memory(Protocol):
+    """A part of a stand that remembers something from one year to the next."""
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Give all that it remembers, by names without its own."""
+
+    def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Take back what `state` gave."""
+
+
 def take_state(stand: Stand) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Give a stand's arrays, and a few numbers that JSON can hold."""
     rows = stand.rows
@@ -22,7 +32,8 @@ def take_state(stand: Stand) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     for name, field in _metamer_fields(stand):
         parts = [field[a:b] for a, b in spans]
         arrays[name] = np.concatenate(parts) if parts else field[:0]
-    arrays.update(stand.surroundings.state())
+    for name, part in stand.memories.items():
+        arrays.update({f"{name}_{key}": array for key, array in part.state().items()})
     meta = {
         "step": stand.steps,
         "next_id": stand.next_id,
@@ -60,7 +71,9 @@ def put_state(stand: Stand, arrays: dict[str, NDArray[Any]], meta: dict[str, Any
             field[s : s + n] = arrays[name][at : at + n]
         at += int(n)
     rows.size[:] = size
-    stand.surroundings.restore(arrays)
+    for name, part in stand.memories.items():
+        start = f"{name}_"
+        part.restore({k[len(start) :]: v for k, v in arrays.items() if k.startswith(start)})
 
 
 def _metamer_fields(stand: Stand) -> list[tuple[str, NDArray[Any]]]:

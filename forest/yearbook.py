@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.dynamics.mortality import Death
 from forest.growth import budget
 from forest.measure.rings import RingYear, breast_ring_widths, ring_rows
 from forest.measure.stand import Flows, Plot, stand_rows
@@ -78,7 +79,8 @@ class YearRecord(NamedTuple):
     year : int
         Calendar year.
     tables : dict of table to columns
-        The year's rows of `/trees`, `/stand`, `/events`, `/rings` and `/carbon`.
+        The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`
+        and, where the scenario has mechanics, `/stability`.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """
@@ -91,7 +93,7 @@ class YearRecord(NamedTuple):
 def record_year(
     stand: Stand,
     measures: TreeMeasures,
-    dead: list[tuple[int, str]],
+    deaths: list[Death],
     accounts: NDArray[np.float64],
     serials_before: dict[int, NDArray[np.int32]],
     rings: RingYear,
@@ -104,8 +106,7 @@ def record_year(
         After growth; trees that die this year are still in its table.
     measures : TreeMeasures
         Of all rows.
-    dead : list of (row, cause)
-        The rows that die.
+    deaths : list of Death
     accounts : float64 (rows, ACCOUNTS)
         The year's carbon accounts, kg per tree.
     serials_before : dict
@@ -115,13 +116,13 @@ def record_year(
     """
     rows = stand.rows
     alive = np.ones(len(rows.tree_id), np.bool_)
-    alive[[row for row, _ in dead]] = False
+    alive[[death.row for death in deaths]] = False
     living = table.keep(rows, alive)
     kept: dict[str, Any] = {name: column[alive] for name, column in measures._asdict().items()}
     of_living = TreeMeasures(**kept)
     events = [
         *stand.pending,
-        *(Event.of(stand, row, "died", cause, measures) for row, cause in dead),
+        *(Event.of(stand, d.row, d.kind, d.cause, measures) for d in deaths),
     ]
     chosen = choose_samples(stand, living, of_living)
     stand.sample_ids.extend(chosen)
@@ -141,10 +142,11 @@ def record_year(
         "events": _event_rows(stand.year, events),
         "rings": _ring_rows(stand, living, of_living, rings),
         "carbon": _carbon_rows(stand, accounts),
+        "climate": _climate_rows(stand),
     }
     if stand.mechanics is not None:
         tables["stability"] = _stability_rows(stand, living)
-    return YearRecord(stand.year, tables, _sample_years(stand, dead, serials_before))
+    return YearRecord(stand.year, tables, _sample_years(stand, deaths, serials_before))
 
 
 def _tree_rows(
@@ -241,6 +243,17 @@ def _carbon_rows(stand: Stand, accounts: NDArray[np.float64]) -> Columns:
     return columns
 
 
+def _climate_rows(stand: Stand) -> Columns:
+    k = len(stand.species)
+    values = stand.climate.values(stand.year)
+    return {
+        "year": np.full(k, stand.year, np.int32),
+        "species": np.arange(k, dtype=np.int16),
+        **{name: np.full(k, value) for name, value in values.items()},
+        "factor": stand.climate.factors(stand.year),
+    }
+
+
 def choose_samples(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> list[int]:
     """Choose the sample trees that are due: by id from the start, by dbh quantile in their year."""
     wanted = stand.scenario.output.sample_trees
@@ -256,12 +269,23 @@ def choose_samples(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> 
     return [i for i in dict.fromkeys(chosen) if i not in stand.sample_ids]
 
 
+def sample_serials(stand: Stand) -> dict[int, NDArray[np.int32]]:
+    """Give the serials of the sample trees' metamers before the year, to tell what is shed."""
+    serials = {}
+    for tree_id in stand.sample_ids:
+        row = int(np.searchsorted(stand.rows.tree_id, tree_id))
+        if row < len(stand.rows.tree_id) and stand.rows.tree_id[row] == tree_id:
+            start, size = int(stand.rows.start[row]), int(stand.rows.size[row])
+            serials[tree_id] = stand.arena.metamers.serial[start : start + size].copy()
+    return serials
+
+
 def _sample_years(
-    stand: Stand, dead: list[tuple[int, str]], before: dict[int, NDArray[np.int32]]
+    stand: Stand, deaths: list[Death], before: dict[int, NDArray[np.int32]]
 ) -> dict[int, SampleYear]:
     """Tell the year of each sample tree; one that dies or is felled loses all its metamers."""
     rows = stand.rows
-    dies = {row for row, _ in dead}
+    dies = {death.row for death in deaths}
     years = {}
     for tree_id in stand.sample_ids:
         row = int(np.searchsorted(rows.tree_id, tree_id))

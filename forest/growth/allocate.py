@@ -47,7 +47,7 @@ from forest.trees.table import Trees
 def income_rate(traits, sp, vigour, year):  # type: ignore[no-untyped-def]
     """Income of one site of a species in full light at the ground, kg a year."""
     per_site = traits.of[sp].light_use * traits.of[sp].leaf_area
-    return per_site * vigour * year.income_factor / year.full_light
+    return per_site * vigour * year.income_factor[sp] / year.full_light
 
 
 @njit

@@ -119,7 +119,7 @@ class Year(NamedTuple):
 
     step: int
     seed: int
-    income_factor: float
+    income_factor: NDArray[np.float64]  # (species,)
     full_light: float
     paper: bool
     balance: bool = False

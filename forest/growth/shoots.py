@@ -355,13 +355,17 @@ def extend(
 
 
 @njit
-def sprout(arena: Metamers, trees: Trees, first_row, heading, traits: SpeciesTraits, year: Year):  # type: ignore[no-untyped-def]
-    """Give each tree from `first_row` on its first metamer, with a terminal bud.
+def sprout(  # type: ignore[no-untyped-def]
+    arena: Metamers, trees: Trees, first_row, heading, metamers, traits: SpeciesTraits, year: Year
+):
+    """Give each tree from `first_row` on its first metamers: a straight stem with buds.
 
     Parameters
     ----------
     heading : float64 (new trees, 3)
-        Direction of each new tree's metamer, a unit vector.
+        Direction of each new tree's stem, a unit vector.
+    metamers : int64 (new trees,)
+        Number of metamers of each stem, one at least.
     """
     for row in range(first_row, len(trees.tree_id)):
         sp = trees.species[row]
@@ -369,13 +373,17 @@ def sprout(arena: Metamers, trees: Trees, first_row, heading, traits: SpeciesTra
         unit = traits.of[sp].internode_length * curve(
             traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, 0.0
         )
+        n = metamers[row - first_row]
         # typed as where shoots go on, so that numba compiles no second _add
-        at, below, main, last = np.int64(0), np.int64(-1), np.bool_(True), np.uint8(255)
-        draws = _draws(trees, row, np.int64(1), year.seed)
-        draw = (draws[0, 0], draws[1, 0], draws[2, 0])
+        order, main, last = np.int64(0), np.bool_(True), np.uint8(255)
+        draws = _draws(trees, row, n, year.seed)
         h = heading[row - first_row]
         x, y, z = h[0], h[1], h[2]
-        _add(arena, trees, row, at, below, main, x, y, z, unit, at, traits, year, last, draw)
-        arena.state[s] = TERMINAL | LATERAL
-        arena.pipe[s] = traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent
-        trees.size[row] = 1
+        pipe = traits.of[sp].twig_diameter ** traits.of[sp].pipe_exponent
+        for k in range(n):
+            draw = (draws[0, k], draws[1, k], draws[2, k])
+            _add(arena, trees, row, k, k - 1, main, x, y, z, unit, order, traits, year, last, draw)
+            above = TERMINAL if k == n - 1 else CONTINUED
+            arena.state[s + k] = above | LATERAL | (MAIN if k > 0 else 0)
+            arena.pipe[s + k] = (n - k) * pipe
+        trees.size[row] = n

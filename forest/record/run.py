@@ -119,6 +119,11 @@ class Run:
         return self._frame("stability")
 
     @property
+    def climate(self) -> pd.DataFrame:
+        """A row per year and species: the climate, and the species' factor on income."""
+        return self._frame("climate")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")

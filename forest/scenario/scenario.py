@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr, ValidationError, ValidationInfo, field_validator, model_validator
 
-from forest.errors import nearest
 from forest.scenario import placing
-from forest.scenario.acts import Act, check_acts
-from forest.scenario.complete import check_spots, complete, embed_stem_map
+from forest.scenario.acts import Act
+from forest.scenario.climate import Climate, embed_file
+from forest.scenario.complete import complete, embed_stem_map
+from forest.scenario.fitting import check_fit
 from forest.scenario.model import (
     Environment,
     Explicit,
@@ -31,16 +32,10 @@ from forest.scenario.model import (
     Site,
     SpeciesUse,
     StemMap,
-    Weather,
 )
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
 from forest.species.text import input_error, parse_toml, read_text, to_toml
-
-#: A periodic grid of more columns of voxels than this fits no memory.
-_MOST_COLUMNS = 250_000_000
-#: Pixels that a picture of the plot may have: its table of tiles then stays small.
-_MOST_PIXELS = 4e9
 
 
 class Scenario(Table):
@@ -51,8 +46,8 @@ class Scenario(Table):
         Scenario(years=10, plot={"size_m": [10, 10]}, environment={"shadow": {}},
                  species={"pinus_sylvestris": {}}, planting={"kind": "random", "density_ha": 4000})
 
-    Files that it names (stem maps, marker clouds) are read at once, and species are completed
-    from the shipped ones, so a scenario and its `to_toml` stand for themselves.
+    Files that it names (stem maps, climates, marker clouds) are read at once, and species are
+    completed from the shipped ones, so a scenario and its `to_toml` stand for themselves.
 
     Raises
     ------
@@ -73,7 +68,7 @@ class Scenario(Table):
     )
     plot: Plot
     site: Site = Site()
-    weather: Weather = Weather()
+    climate: Climate = Climate()
     growth: Growth = Growth()
     mechanics: Mechanics | None = None
     environment: Environment
@@ -140,6 +135,13 @@ class Scenario(Table):
 
     # --- checks and completion -------------------------------------------------------------
 
+    @model_validator(mode="before")
+    @classmethod
+    def _climate_was_weather(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and "weather" in data:
+            raise Refusal("unknown key 'weather', did you mean 'climate'?")
+        return data
+
     @field_validator("species", mode="before")
     @classmethod
     def _complete_species(cls, species: Any) -> Any:
@@ -147,6 +149,11 @@ class Scenario(Table):
         if not isinstance(species, dict):
             return species
         return {name: complete(name, given) for name, given in species.items()}
+
+    @field_validator("climate")
+    @classmethod
+    def _read_climate(cls, climate: Climate, info: ValidationInfo) -> Climate:
+        return embed_file(climate, info)
 
     @field_validator("planting")
     @classmethod
@@ -165,94 +172,8 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
-    def _wind_has_a_price(self) -> Scenario:
-        if self.mode == "paper" and self.mechanics is not None and self.mechanics.wind_growth:
-            raise Refusal(
-                "wind_growth shifts dry mass, and paper mode has none",
-                key="mechanics.wind_growth",
-                expected='mode = "mass_balance"',
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _picture_fits(self) -> Scenario:
-        rendered = self.environment.rendered
-        if rendered is None:
-            return self
-        if rendered.clearing_radius_m is not None and self.plot.boundary == "periodic":
-            raise Refusal(
-                "a periodic plot has no clearing",
-                key="environment.rendered.clearing_radius_m",
-                expected='plot.boundary = "open"',
-            )
-        size_x, size_y = self.plot.size_m
-        least = (size_x * size_y / _MOST_PIXELS) ** 0.5
-        if rendered.pixel_m < least:
-            raise Refusal(
-                f"{rendered.pixel_m:g} is too fine for a plot of {size_x:g} x {size_y:g} m",
-                key="environment.rendered.pixel_m",
-                expected=f"at least {least:.3g}",
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _grid_fits(self) -> Scenario:
-        shadow, canopy = self.environment.shadow, self.environment.canopy
-        edge = canopy.voxel_m if canopy else shadow.voxel_m if shadow else None
-        if edge is None:
-            return self
-        fine = shadow.voxel_m if shadow else edge
-        name = "shadow" if shadow else "canopy"
-        size_x, size_y = self.plot.size_m
-        if size_x * size_y / fine**2 > _MOST_COLUMNS:
-            least = (size_x * size_y / _MOST_COLUMNS) ** 0.5
-            raise Refusal(
-                f"{fine:g} is too fine for a plot of {size_x:g} x {size_y:g} m",
-                key=f"environment.{name}.voxel_m",
-                expected=f"at least {least:.3g}",
-            )
-        if self.plot.boundary == "periodic":
-            fit = [max(round(size / edge), 1) * edge for size in self.plot.size_m]
-            if any(abs(a - b) > 1e-6 for a, b in zip(fit, self.plot.size_m, strict=True)):
-                raise Refusal(
-                    f"{list(self.plot.size_m)} is not a whole multiple of the voxel edge {edge:g}",
-                    key="plot.size_m",
-                    expected=f"on a periodic plot for example [{fit[0]:g}, {fit[1]:g}]",
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _trees_fit(self) -> Scenario:
-        planting = self.planting
-        if isinstance(planting, Explicit):
-            self._check_trees(planting)
-        elif not any(use.share > 0 for use in self.species.values()):
-            raise Refusal("every share is 0", key="species", expected="a share above 0")
-        elif isinstance(planting, Random):
-            placing.random_count(self.plot.size_m, planting.density_ha, planting.min_distance_m)
-        elif isinstance(planting, Regular):
-            size, step = self.plot.size_m, planting.spacing_m
-            if (size[0] / step[0]) * (size[1] / step[1]) > placing.MOST_TREES:
-                raise Refusal(
-                    "too many trees",
-                    key="planting.spacing_m",
-                    expected=f"at most {placing.MOST_TREES} trees on the plot",
-                )
-        return self
-
-    def _check_trees(self, planting: Explicit) -> None:
-        for i, tree in enumerate(planting.trees):
-            key = f"planting.trees[{i}]"
-            if not tree.species and len(self.species) > 1:
-                raise Refusal("missing key 'species'", key=key, expected="a species' name")
-            if tree.species and tree.species not in self.species:
-                hint = nearest(tree.species, self.species)
-                raise Refusal(f"unknown species {tree.species!r}, {hint}", key=f"{key}.species")
-        check_spots(planting.trees, self.plot, key="planting.trees")
-
-    @model_validator(mode="after")
-    def _acts_fit(self) -> Scenario:
-        check_acts(self.acts, self.plot, self.species, self.calendar)
+    def _parts_fit(self) -> Scenario:
+        check_fit(self)
         return self
 
     @model_validator(mode="after")

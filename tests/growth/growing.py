@@ -37,12 +37,12 @@ def make_traits(*species: Species, paper: bool = False) -> SpeciesTraits:
     return species_traits(species or [make_species()], paper=paper)
 
 
-def make_year(step: int = 5, **changes: Any) -> Year:
-    """A year of mass balance with the extended Borchert-Honda model."""
+def make_year(step: int = 5, income_factor: float = 1.0, **changes: Any) -> Year:
+    """A year of mass balance with the extended Borchert-Honda model, alike for all species."""
     year = Year(
         step=step,
         seed=3,
-        income_factor=1.0,
+        income_factor=np.full(8, income_factor),
         full_light=1.0,
         paper=False,
     )

@@ -38,7 +38,7 @@ TREE = make_species()
 def prices_of(traits: SpeciesTraits, vigour: float, year: Year) -> slow.Prices:
     """The numbers that the twin needs, from the species' record."""
     of = traits.of[0]
-    rate = of["light_use"] * of["leaf_area"] * vigour * year.income_factor / year.full_light
+    rate = of["light_use"] * of["leaf_area"] * vigour * year.income_factor[0] / year.full_light
     names = set(slow.Prices.__dataclass_fields__) - {"rate", "full_light"}
     full = year.full_light
     return slow.Prices(

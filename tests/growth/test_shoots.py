@@ -53,7 +53,8 @@ def plant_one(traits: SpeciesTraits, year: Year) -> tuple[Arena, Trees]:
     )
     arena = Arena()
     arena.make_room(trees.start, trees.size, trees.room, np.ones(1, np.int64))
-    sprout(arena.metamers, trees, 0, UP[None], traits, year._replace(step=0))
+    one = np.ones(1, np.int64)
+    sprout(arena.metamers, trees, 0, UP[None], one, traits, year._replace(step=0))
     return arena, trees
 
 

@@ -1,0 +1,134 @@
+"""How trees come into a stand: planted, or recruited with the size and age they have reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
+from forest.growth.shoots import sprout
+from forest.trees import table
+from forest.yearbook import Event
+
+if TYPE_CHECKING:
+    from forest.growth.parameters import SpeciesTraits
+    from forest.stand import Stand
+
+
+class Newcomers(NamedTuple):
+    """Trees that come into a stand; arrays of n entries.
+
+    Attributes
+    ----------
+    x, y : float64
+        Places, m, inside the plot.
+    species : int
+        Indices into the scenario's species.
+    heading : float64 (n, 3)
+        Unit vectors along which their stems stand.
+    height_m : float64
+        Their height: as many internodes as fit best, one at least.
+    age : int
+        Years since they germinated.
+    mother_id : int
+        Trees that seeded them; 0 if planted or not known.
+    reserve_kg : float64
+        What they have stored; NaN for the species' seed reserve.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    species: NDArray[Any]
+    heading: NDArray[np.float64]
+    height_m: NDArray[np.float64]
+    age: NDArray[Any]
+    mother_id: NDArray[Any]
+    reserve_kg: NDArray[np.float64]
+
+    @classmethod
+    def planted(
+        cls,
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        species: NDArray[Any],
+        heading: NDArray[np.float64],
+    ) -> Newcomers:
+        """Seedlings of one internode."""
+        n = len(x)
+        none = np.zeros(n, np.int64)
+        return cls(x, y, species, heading, np.zeros(n), none, none, np.full(n, np.nan))
+
+
+def plant(
+    stand: Stand,
+    x: Sequence[float],
+    y: Sequence[float],
+    species: str | Sequence[str],
+    lean_deg: float | Sequence[float],
+    lean_azimuth_deg: float | Sequence[float],
+    traits: SpeciesTraits,
+) -> list[int]:
+    """Plant seedlings; see `forest.Stand.plant`."""
+    names = [species] * len(x) if isinstance(species, str) else list(species)
+    at = np.asarray(x, np.float64), np.asarray(y, np.float64)
+    width, depth = stand.scenario.plot.size_m
+    check_planting(*at, names, (width, depth), stand.species_names)
+    leans = check_leans(len(x), lean_deg, lean_azimuth_deg)
+    if stand.scenario.plot.boundary == "periodic":
+        at = at[0] % width, at[1] % depth
+    codes = np.array([stand.species_names.index(name) for name in names], np.int16)
+    return establish(stand, Newcomers.planted(*at, codes, headings(*leans)), "planted", traits)
+
+
+def establish(stand: Stand, new: Newcomers, kind: str, traits: SpeciesTraits) -> list[int]:
+    """Give trees their rows and first metamers, and note the event; they grow from the next step.
+
+    Parameters
+    ----------
+    stand : Stand
+    new : Newcomers
+    kind : {"planted", "recruited"}
+        The event.
+    traits : SpeciesTraits
+
+    Returns
+    -------
+    list of int
+        Their ids.
+    """
+    first_id, first_row = stand.next_id, len(stand.rows.tree_id)
+    more = seedlings(
+        new.x,
+        new.y,
+        new.species,
+        first_id=first_id,
+        step=stand.steps,
+        seed=stand.scenario.seed,
+        voxel_m=stand.surroundings.voxel_m,
+        vigour_sd=np.array([s.carbon.vigour_sd for s in stand.species]),
+        seed_reserve_kg=np.array([s.carbon.seed_reserve_kg for s in stand.species]),
+    )
+    more.birth[:] -= np.asarray(new.age, np.int32)
+    more.mother_id[:] = new.mother_id
+    given = ~np.isnan(new.reserve_kg)
+    more.reserve[given] = new.reserve_kg[given]
+    stand.next_id += len(more.tree_id)
+    stand.rows = table.append(stand.rows, more)
+    rows = stand.rows
+    internode = np.array([s.architecture.internode_length_m for s in stand.species])
+    metamers = np.maximum(np.rint(new.height_m / internode[more.species]), 1.0).astype(np.int64)
+    wanted = rows.size.astype(np.int64)
+    wanted[first_row:] = metamers
+    stand.arena.make_room(rows.start, rows.size, rows.room, wanted)
+    sprout(
+        stand.arena.metamers, rows, first_row, new.heading, metamers, traits, stand.growth_year()
+    )
+    for field in stand.arena.companions:
+        field[rows.start[first_row:]] = 0  # they get their rods with their first year
+    measures = stand.measure()
+    for row in range(first_row, len(rows.tree_id)):
+        stand.pending.append(Event.of(stand, row, kind, "none", measures))
+    return list(range(first_id, stand.next_id))
