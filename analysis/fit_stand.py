@@ -84,7 +84,7 @@ def grow_towards(
     """
     stand = forest.Stand(scenario_of(species, goal, plot_m, seed, values))
     rows = []
-    for age in range(1, goal.years + 1):
+    for age in range(goal.seedling_age + 1, goal.years + 1):
         table = goal.thinned
         if table is not None and age >= _FIRST_THINNING and age % _EVERY == 0:
             thin_from_below(stand, number_at(table, age))
@@ -93,7 +93,8 @@ def grow_towards(
         if not len(stand.rows.tree_id):
             break
     grown = pd.DataFrame(rows)
-    grown.index = pd.RangeIndex(1, len(grown) + 1, name="age")
+    first = goal.seedling_age + 1
+    grown.index = pd.RangeIndex(first, first + len(grown), name="age")
     grown["open_slenderness"] = open_slenderness(species, goal, values)
     return grown
 

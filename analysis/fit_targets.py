@@ -74,9 +74,12 @@ class Goal:
     density_ha, latitude_deg : float
         Seedlings planted, and where.
     years : int
+        Age to which the stand is grown.
     targets : tuple of Target
     free : tuple of Free
         What the fit may move.
+    seedling_age : int
+        Age of the seedlings when planted, from which tables count: 0.2 m high, one internode.
     thinned : DataFrame or None
         The yield table whose N the stand is felled to, from below.
     """
@@ -87,6 +90,7 @@ class Goal:
     years: int
     targets: tuple[Target, ...]
     free: tuple[Free, ...]
+    seedling_age: int = 0
     thinned: pd.DataFrame | None = None
 
 
@@ -166,6 +170,7 @@ GOALS = {
             _slenderness(58.0),
         ),
         free=(*_STRAIGHT, Free("leaves.sla_m2_kg", 4.0, 12.0)),
+        seedling_age=3,
     ),
     "picea_abies": Goal(
         source=_ASSMANN,
@@ -180,6 +185,7 @@ GOALS = {
             _slenderness(66.0),
         ),
         free=(*_STRAIGHT, Free("leaves.sla_m2_kg", 4.0, 9.0)),
+        seedling_age=3,
         thinned=ASSMANN,
     ),
     "fagus_sylvatica": Goal(

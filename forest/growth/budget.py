@@ -50,10 +50,10 @@ def path_lengths(parent, order, length, branch_pipe, path, pipe_path):  # type: 
 
 @njit
 def light_response(light, full_light, half):  # type: ignore[no-untyped-def]
-    """What leaves make of their light, as light that counts fully: all of it, or a saturating share.
+    """The light that leaves make full use of: all of it, or what income saturating with light uses.
 
     Leaves earn l (1 + c) / (l + c) of what they earn in full light, l being their share of it
-    (Pacala et al. 1996, G1 l / (G1 / S + l)); the smaller the `half` c, the less they lose in shade.
+    (Pacala et al. 1996, G1 l / (G1 / S + l)); the smaller c, the `half`, the less shade takes.
     """
     if half <= 0.0:
         return light

@@ -72,7 +72,7 @@ def test_light_response(share: float, half: float, full: float) -> None:
 
 @given(st.floats(0.0, 100.0), st.sampled_from([5.0, 40.0, np.inf]))
 def test_extension(height: float, limit: float) -> None:
-    """Internodes shorten linearly towards the limit, never below a tenth; without one they do not."""
+    """Internodes shorten linearly towards the limit, to a tenth; without one not at all."""
     assert extension(height, limit) == slow.extension(height, limit)
     assert extension(0.0, limit) == 1.0
 
