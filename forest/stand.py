@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -23,11 +23,13 @@ from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds
+from forest.inventory import Built, settle
 from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.regeneration import Regeneration
+from forest.scenario.inventory import Inventory
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
@@ -54,6 +56,8 @@ class Stand:
     ----------
     scenario : Scenario
         What to grow, and where.
+    say : callable, optional
+        Told how the nursery goes on where the stand starts from an inventory.
 
     Attributes
     ----------
@@ -81,6 +85,8 @@ class Stand:
         Seeds and seedlings, where the scenario has regeneration.
     surroundings : Surroundings
         Light and space.
+    built : Built or None
+        How near the first trees are to the inventory that they were built from.
     dead_wood : DeadWood or None
         Snags and lying dead wood, where the scenario has snags.
     memories : dict of str to Memory
@@ -89,8 +95,14 @@ class Stand:
         Wall time spent in each phase of the year so far.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    built: Built | None = None
+
+    def __init__(self, scenario: Scenario, say: Callable[[str], None] = lambda _: None) -> None:
         self._start(scenario)
+        if isinstance(scenario.planting, Inventory):
+            self.built = settle(self, scenario.planting, Stand, say)
+            management.check_due(self)
+            return
         first = establishment.Newcomers.planted(
             *scenario.planting_positions(), headings(*scenario.planting_leans())
         )

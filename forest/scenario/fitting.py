@@ -9,6 +9,7 @@ from forest.scenario import placing
 from forest.scenario.acts import check_acts
 from forest.scenario.climate import check_covered
 from forest.scenario.complete import check_spots
+from forest.scenario.inventory import Inventory
 from forest.scenario.model import Explicit, Random, Regular
 from forest.scenario.mortality import check_mortality
 from forest.scenario.regeneration import check_regeneration
@@ -106,6 +107,8 @@ def _trees_fit(scenario: Scenario) -> None:
     planting, size = scenario.planting, scenario.plot.size_m
     if isinstance(planting, Explicit):
         _check_trees(scenario, planting)
+    elif isinstance(planting, Inventory):
+        return  # its trees were checked when they were read
     elif not any(use.share > 0 for use in scenario.species.values()):
         raise Refusal("every share is 0", key="species", expected="a share above 0")
     elif isinstance(planting, Random):

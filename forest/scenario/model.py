@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from forest.scenario import files
+from forest.scenario.inventory import Inventory
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, quantity
 
@@ -302,7 +303,7 @@ class Random(Table):
     )
 
 
-Planting = Annotated[Explicit | StemMap | Regular | Random, Field(discriminator="kind")]
+Planting = Annotated[Explicit | StemMap | Regular | Random | Inventory, Field(discriminator="kind")]
 
 
 class Box(Table):
