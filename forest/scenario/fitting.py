@@ -26,7 +26,9 @@ def check_fit(scenario: Scenario) -> None:
     _picture_fits(scenario)
     _grid_fits(scenario)
     _trees_fit(scenario)
-    check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
+    shares = {name: use.share for name, use in scenario.species.items()}
+    regular = isinstance(scenario.planting, Regular)
+    check_acts(scenario.acts, scenario.plot, shares, scenario.calendar, regular)
 
 
 def _wind_has_a_price(scenario: Scenario) -> None:
