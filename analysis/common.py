@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,19 +41,31 @@ class Study:
 
 
 def script(
-    document: str | None, study: Callable[[Run], Study], words: Sequence[str] | None
+    document: str | None,
+    study: Callable[..., Study],
+    words: Sequence[str] | None,
+    *,
+    against: bool = False,
 ) -> None:
-    """Answer `python analysis/x.py run.h5 --to figure.png`: draw the figure, print the numbers."""
+    """Answer `python analysis/x.py run.h5 --to figure.png`: draw the figure, print the numbers.
+
+    With `against`, the study may be given another run by `--against`.
+    """
     lines = (document or "").strip().splitlines()
     parser = argparse.ArgumentParser(description=lines[0])
     parser.add_argument("run", type=Path, help="run file")
     parser.add_argument("--to", type=Path, required=True, help="figure to write: .png, .pdf, .svg")
+    if against:
+        parser.add_argument("--against", type=Path, help="run file to compare it with")
     asked = parser.parse_args(words)
+    others = [asked.against] if against and asked.against else []
     try:
-        with forest.open_run(asked.run) as run:
-            if not len(run.years):
-                raise forest.InputError("holds no years yet", where=str(run.path))
-            made = study(run)
+        with ExitStack() as stack:
+            runs = [stack.enter_context(forest.open_run(path)) for path in (asked.run, *others)]
+            for run in runs:
+                if not len(run.years):
+                    raise forest.InputError("holds no years yet", where=str(run.path))
+            made = study(*runs)
         save(made.figure, asked.to)
     except forest.InputError as error:
         print(f"error: {error}", file=sys.stderr)

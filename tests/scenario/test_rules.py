@@ -34,7 +34,7 @@ def _read(act: str) -> Scenario:
             "(from 2002, until 2007, 2 years apart, at most 3 times)",
         ),
         (
-            "kind='harvest', method='gap', years=[2002, 2005], gap={%s}" % CIRCLE,
+            "kind='harvest', method='gap', years=[2002, 2005], gap={" + CIRCLE + "}",
             "harvest in a gap (circle) in 2002, 2005",
         ),
         (
@@ -101,9 +101,9 @@ def test_rules_are_read_told_and_written(act: str, words: str) -> None:
         ("kind='prune', year=2003, below_m=1, tree_id=3, min_dbh_cm=3", "given beside tree_id"),
         ("kind='prune', year=2003, all_trees=true, below_share=1.5", "below_share: 1.5"),
         ("kind='plant', year=2003", "acts[0].x_m: missing; expected positions, or a pattern"),
-        ("kind='plant', year=2003, x_m=[1], y_m=[1], clear_m=3", "clear_m: given without a pattern"),
+        ("kind='plant', year=2003, x_m=[1], y_m=[1], clear_m=3", "clear_m: given without"),
         ("kind='plant', year=2003, pattern='random', spacing_m=[1, 1]", "missing key 'density_ha'"),
-        ("kind='plant', year=2003, pattern='random', density_ha=1e7", "acts[0].density_ha: 100000"),
+        ("kind='plant', year=2003, pattern='random', density_ha=1e4, min_distance_m=2", "2 m ap"),
         ("kind='plant', year=2003, pattern='regular', spacing_m=[1, 1], shares=[1]",
          "shares: 1 for 0 species"),
     ],
