@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,29 +44,36 @@ def script(
     document: str | None,
     study: Callable[..., Study],
     words: Sequence[str] | None,
+    options: Mapping[str, tuple[float, str]] | None = None,
     *,
     against: bool = False,
 ) -> None:
     """Answer `python analysis/x.py run.h5 --to figure.png`: draw the figure, print the numbers.
 
-    With `against`, the study may be given another run by `--against`.
+    Each of `options` is a number that may be given, `--name 1.5`: its default, and what it is. The
+    study is called with the run and with these by name. With `against` it may be given another
+    run beside the first, by `--against`.
     """
     lines = (document or "").strip().splitlines()
     parser = argparse.ArgumentParser(description=lines[0])
     parser.add_argument("run", type=Path, help="run file")
     parser.add_argument("--to", type=Path, required=True, help="figure to write: .png, .pdf, .svg")
+    for name, (default, text) in (options or {}).items():
+        flag = "--" + name.replace("_", "-")
+        parser.add_argument(flag, type=float, default=default, help=f"{text}; default {default:g}")
     if against:
         parser.add_argument("--against", type=Path, help="run file to compare it with")
-    asked = parser.parse_args(words)
-    others = [asked.against] if against and asked.against else []
+    asked = vars(parser.parse_args(words))
+    path, to, other = asked.pop("run"), asked.pop("to"), asked.pop("against", None)
     try:
         with ExitStack() as stack:
-            runs = [stack.enter_context(forest.open_run(path)) for path in (asked.run, *others)]
+            paths = [path] if other is None else [path, other]
+            runs = [stack.enter_context(forest.open_run(one)) for one in paths]
             for run in runs:
                 if not len(run.years):
                     raise forest.InputError("holds no years yet", where=str(run.path))
-            made = study(*runs)
-        save(made.figure, asked.to)
+            made = study(*runs, **asked)
+        save(made.figure, to)
     except forest.InputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from forest import establishment, management
 from forest.dynamics.mortality import Death, starved
 from forest.dynamics.planting import headings
-from forest.dynamics.weather import income_factor
+from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
 from forest.growth.allocate import allocate
@@ -64,6 +64,8 @@ class Stand(management.Hand):
         Id of the next tree.
     mechanics : Mechanics or None
         What bends and holds the trees, where the scenario has mechanics.
+    climate : Climate
+        What each year is like, and what the species make of it.
     surroundings : Surroundings
         Light and space.
     treatments : Treatments
@@ -95,6 +97,7 @@ class Stand(management.Hand):
         self._ring_heights = np.array(scenario.output.ring_heights_m, np.float64)
         self._pipes_before = np.empty(0, np.float32)
         self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.treatments = management.Treatments(self)
         self.memories: dict[str, Memory] = {
@@ -123,10 +126,11 @@ class Stand(management.Hand):
 
         Raises
         ------
-        ActError
-            If an act cannot be done; then the stand is as it was.
+        InputError
+            If an act cannot be done, or the climate ends before; then the stand is as it was.
         """
         self._clock = time.perf_counter()
+        self.climate.check_known(self.year + 1)
         management.act(self, self._traits)
         self._lap("act")
         self.steps += 1
@@ -258,16 +262,10 @@ class Stand(management.Hand):
     def growth_year(self) -> Year:
         """Tell growth what it must know of the current step."""
         s = self.scenario
-        factor = income_factor(
-            self.year,
-            s.seed,
-            s.weather.noise_sd,
-            [(e.year, e.factor) for e in s.weather.extreme_years],
-        )
         return Year(
             step=self.steps,
             seed=s.seed,
-            income_factor=np.full(len(self.species), factor * s.site.productivity),
+            income_factor=self.climate.factors(self.year) * s.site.productivity,
             full_light=self._full_light,
             paper=self._paper,
             balance=s.growth.bud_fate == "balance",

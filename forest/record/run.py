@@ -119,6 +119,11 @@ class Run:
         return self._frame("stability")
 
     @property
+    def climate(self) -> pd.DataFrame:
+        """A row per year and species: the climate, and the species' factor on income."""
+        return self._frame("climate")
+
+    @property
     def treatments(self) -> pd.DataFrame:
         """The stand before and after each act: the columns of `stand`, as the acts left it."""
         return self._frame("treatments")
