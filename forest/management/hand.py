@@ -69,6 +69,9 @@ class Hand:
             If a place lies outside the plot, a species is unknown, or the pattern is not right.
         """
         stand = cast("Stand", self)
+        if species is None and not pattern and len(stand.species_names) > 1:
+            known = "one of " + ", ".join(stand.species_names)
+            raise InputError("no species given", where="Stand.plant", expected=known)
         if x is not None and y is not None and not pattern:
             names = [species or stand.species_names[0]] * len(x)
             if species is not None and not isinstance(species, str):

@@ -69,15 +69,16 @@ def to_thin(rule: Thinning, census: Census, stand: Stand, standing: Mask, number
     if rule.method == "geometric":
         return rows[_lined(rule, census, stand)[rows]]
     if rule.method == "selective":
-        return _around_crop_trees(rule, census, stand, standing, chosen, plot)
-    if rule.method == "below":
+        order = _around_crop_trees(rule, census, stand, standing, chosen, plot)
+    elif rule.method == "below":
         order = census.from_thin_to_thick(rows)
     elif rule.method == "above":
         order = census.from_thick_to_thin(rows)
     else:
         order = census.at_random(rows, stand.scenario.seed, number, stand.steps)
+    if rule.target is None:
+        return order
     most = np.array([s.mensuration.max_sdi for s in stand.species])
-    assert rule.target is not None
     return thinning.thin_to(order, counted, census, rule.target, plot.hectares, most)
 
 
@@ -99,12 +100,15 @@ def _lined(rule: Thinning, census: Census, stand: Stand) -> Mask:
 def _around_crop_trees(
     rule: Thinning, census: Census, stand: Stand, standing: Mask, chosen: Mask, plot: Plot
 ) -> Rows:
+    """Order the competitors of crop trees as they go."""
     assert rule.crop_trees_ha is not None
     crop, _ = trees_of(rule, census, stand, standing, rule.crop_species)
     order = census.from_thick_to_thin(np.flatnonzero(crop & ~np.isnan(census.dbh_cm)))
     count = max(round(rule.crop_trees_ha * plot.hectares), 1)
     favoured = thinning.spaced(order, census, plot, rule.crop_spacing_m or 0.0, count=count)
-    number = COMPETITORS if rule.competitors is None else rule.competitors
+    number = rule.competitors
+    if number is None:
+        number = COMPETITORS if rule.target is None else len(census.x)
     within = WITHIN_M if rule.within_m is None else rule.within_m
     return thinning.competitors(favoured, census, chosen, plot, number, within)
 

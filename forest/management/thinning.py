@@ -7,6 +7,7 @@ area; among such trees the lower one is the thinner.
 
 from __future__ import annotations
 
+from itertools import chain, zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -235,7 +236,8 @@ def competitors(
     Returns
     -------
     int64 (k,)
-        Rows in ascending order. A tree that presses two crop trees counts for both.
+        Rows in the order in which they go: the strongest of each crop tree, in the order of
+        `crop`, then the second of each... A tree that presses two crop trees counts for both.
 
     Notes
     -----
@@ -244,11 +246,12 @@ def competitors(
     """
     may = candidates & ~np.isnan(census.dbh_cm)
     may[crop] = False
-    gone: set[int] = set()
+    strongest_of = []
     for row in crop:
         away = distances(census, plot, census.x[row], census.y[row])
         near = np.flatnonzero(may & (away <= within_m))
         strength = census.dbh_cm[near] / np.maximum(away[near], 1e-6)
-        strongest = np.lexsort((census.tree_id[near], -strength))[:count]
-        gone.update(near[strongest].tolist())
-    return np.array(sorted(gone), np.int64)
+        ranked = near[np.lexsort((census.tree_id[near], -strength))[:count]].tolist()
+        strongest_of.append(ranked)
+    rounds = chain.from_iterable(zip_longest(*strongest_of))
+    return np.array([row for row in dict.fromkeys(rounds) if row is not None], np.int64)

@@ -126,7 +126,12 @@ class Thinning(Rule):
         max_length=200,
     )
     competitors: int | None = quantity(
-        None, "the strongest competitors of each that go; default: 1", unit="", ge=1, le=100
+        None,
+        "the strongest competitors of each that go; default: 1, or with a target all until it is "
+        "met",
+        unit="",
+        ge=1,
+        le=100,
     )
     within_m: float | None = quantity(
         None, "distance within which trees compete; default: 6", unit="m", gt=0, le=100
@@ -138,9 +143,13 @@ class Thinning(Rule):
         rows = ("every_row", "first_row", "row_spacing_m", "rows_along")
         strips = ("strip_width_m", "strip_spacing_m")
         crop = ("crop_trees_ha", "crop_spacing_m", "crop_species", "competitors", "within_m")
-        _only_of(self, self.method, {**by_target, "geometric": rows + strips, "selective": crop})
-        if self.method in by_target and self.target is None:
-            given = [key for key in TARGETS if getattr(self, key) is not None]
+        _only_of(
+            self,
+            self.method,
+            {**by_target, "geometric": rows + strips, "selective": crop + TARGETS},
+        )
+        given = [key for key in TARGETS if getattr(self, key) is not None]
+        if len(given) > 1 or (self.method in by_target and not given):
             what = " and ".join(given) + " exclude each other" if given else "no target given"
             raise Refusal(what, expected="one of " + ", ".join(TARGETS))
         if self.method == "selective" and self.crop_trees_ha is None:
@@ -171,22 +180,23 @@ class Thinning(Rule):
 
     @property
     def target(self) -> tuple[str, float] | None:
-        """What is left or taken, and how much; None if there is not exactly one."""
+        """What is left or taken, and how much; None without a target."""
         given = [(key, value) for key in TARGETS if (value := getattr(self, key)) is not None]
-        return given[0] if len(given) == 1 else None
+        return given[0] if given else None
 
     @property
     def in_words(self) -> str:
         """Say which trees go."""
         of = f" of {', '.join(self.species)}" if self.species else ""
-        if self.method == "selective":
-            return f"thin{of} around {self.crop_trees_ha:g} crop trees/ha"
         if self.method == "geometric":
             if self.every_row is not None:
                 return f"thin{of} one row of {self.every_row}"
             return f"thin{of} strips {self.strip_width_m:g} m wide"
-        assert self.target is not None
         how = "at random" if self.method == "random" else f"from {self.method}"
+        if self.method == "selective":
+            how = f"around {self.crop_trees_ha:g} crop trees/ha"
+        if self.target is None:
+            return f"thin{of} {how}"
         key, value = self.target
         return f"thin{of} {how} {'by' if key.startswith('share') else 'to'} {key} {value:g}"
 

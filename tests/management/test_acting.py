@@ -27,6 +27,8 @@ RULES = {
     "rows": "{kind='thin', year=2005, method='geometric', every_row=2, row_spacing_m=2.5}",
     "strips": "{kind='thin', year=2005, method='geometric', strip_width_m=2, strip_spacing_m=5}",
     "crop": "{kind='thin', year=2007, method='selective', crop_trees_ha=200, crop_spacing_m=3}",
+    "crop to a target": "{kind='thin', year=2007, method='selective', crop_trees_ha=100, "
+    "share_n=0.3, within_m=20}",
     "limit": "{kind='harvest', year=2007, method='diameter_limit', limit_cm=1.5}",
     "shelterwood": "{kind='harvest', year=2007, method='shelterwood', keep_share=0.4}",
     "clearcut": "{kind='harvest', year=2005, method='clearcut', species='pinus_sylvestris'}",
@@ -121,6 +123,25 @@ def test_targets_are_met_and_ids_told() -> None:
     events = record.tables["events"]
     causes = [CAUSES[code] for code in events["cause"][events["kind"] == 3]]
     assert causes == ["thinning"] * 3 + ["harvest"] * (len(inside) + len(clearcut))
+
+
+def test_crop_trees_stay_until_the_target() -> None:
+    """Three of ten trees go, those that press the thickest most; it stays."""
+    stand = Stand(tiny())
+    steps(stand, 7)
+    trees = stand.trees.sort_values("dbh_cm", ascending=False).dropna(subset="dbh_cm")
+    assert len(trees) > 4
+    gone = stand.thin(method="selective", crop_trees_ha=100, share_n=0.3, within_m=20)
+    assert len(gone) == 3
+    assert trees.tree_id.iloc[0] in stand.trees.tree_id.to_numpy()
+
+
+def test_nothing_is_left() -> None:
+    """After a clear-cut the years go on, triggers are asked, and seedlings can come."""
+    later = "{kind='plant', when='n_ha < 1', pattern='regular', spacing_m=[5, 5], wait_years=3}"
+    records = steps(Stand(with_acts("{kind='harvest', year=2003, method='clearcut'}", later)), 5)
+    count = [len(record.tables["trees"]["tree_id"]) for record in records]
+    assert count == [10, 10, 0, 4, 4]
 
 
 def test_planting_keeps_clear_of_stems() -> None:
@@ -291,7 +312,8 @@ def test_rows_of_a_regular_planting() -> None:
         (lambda s: s.prune(all_trees=True, species="x", below_m=2), "unknown species 'x'"),
         (lambda s: s.plant(pattern="regular"), "Stand.plant: missing key 'spacing_m'"),
         (lambda s: s.plant(pattern="random", density_ha=9, species="oak"), "unknown species 'oak'"),
-        (lambda s: s.plant([1.0]), "Stand.plant: y_m: 0 for 1 x_m"),
+        (lambda s: s.plant([1.0], [1.0]), "Stand.plant: no species given; expected one of"),
+        (lambda s: s.plant([1.0], species="fagus_sylvatica"), "Stand.plant: y_m: 0 for 1 x_m"),
     ],
 )
 def test_refused_by_hand(call: Any, says: str) -> None:

@@ -176,6 +176,9 @@ def test_crop_trees_and_their_competitors(
     gone = thinning.competitors(crop, census, everyone, plot, strongest, 5.0)
     assert set(census.tree_id[gone]) == slow.pressing(twins, trees, strongest, 5.0, SIZE, periodic)
     assert not set(gone) & set(crop)
+    for fewer in range(1, strongest):  # those of fewer competitors go first
+        first = thinning.competitors(crop, census, everyone, plot, fewer, 5.0)
+        assert gone[: len(first)].tolist() == first.tolist()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
