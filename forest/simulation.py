@@ -65,7 +65,7 @@ def simulate(
     resume : bool
         Go on with an unfinished run of the same scenario, from its last checkpoint; a run without
         one starts over. A finished run is given back, and goes on if `scenario.years` has grown.
-        Acts and climate of years that are not on file may differ.
+        Acts, deaths and climate of years that are not on file may differ.
     overwrite : bool
         Replace an existing file.
     progress : bool or Observer
@@ -189,8 +189,8 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
             raise InputError(
                 "was made by a different scenario",
                 where=f"--resume {out}",
-                expected="the same scenario, seed and settings; only `years` may grow, and acts "
-                "and climate of years that are not on file may differ",
+                expected="the same scenario, seed and settings; only `years` may grow, and acts, "
+                "deaths and climate of years that are not on file may differ",
             )
         if years_done > scenario.years:
             raise InputError(
@@ -202,7 +202,7 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
 
 
 def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
-    """Compare two scenarios but for their years, and for acts and climate in years not done.
+    """Compare two scenarios but for their years, and for acts, deaths and climate to come.
 
     Each may choose its sample trees in its own last year.
     """
@@ -211,6 +211,8 @@ def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
         content = scenario.model_dump()
         done = range(scenario.start_year, scenario.start_year + years_done)
         content["acts"] = acts_so_far(scenario.acts, done)
+        deaths = content["mortality"]
+        deaths["events"] = [event for event in deaths["events"] if event["year"] in done]
         climate = content["climate"]
         if not climate["repeat"]:  # a series may go on
             climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest import establishment, management
-from forest.dynamics.mortality import Death, starved
+from forest.dynamics import mortality
+from forest.dynamics.mortality import Death
 from forest.dynamics.planting import headings
+from forest.dynamics.snags import DeadWood
 from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
@@ -27,7 +29,14 @@ from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.yearbook import Event, Loss, YearRecord, record_year, sample_serials
+from forest.yearbook import (
+    Event,
+    Loss,
+    YearRecord,
+    record_year,
+    sample_serials,
+    snag_columns,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,6 +79,8 @@ class Stand(management.Hand):
         Light and space.
     treatments : Treatments
         What acts changed since the last record.
+    dead_wood : DeadWood or None
+        Snags and lying dead wood, where the scenario has snags.
     memories : dict of str to Memory
         The parts that remember something between years, for checkpoints.
     seconds : dict of str to float
@@ -83,6 +94,7 @@ class Stand(management.Hand):
         )
         establishment.establish(self, first, "planted", self._traits)
         management.check_due(self)  # what cannot be done in the first year is refused before it
+        mortality.check_due(self)
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -109,6 +121,10 @@ class Stand(management.Hand):
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
             plot = Plot(*scenario.plot.size_m, scenario.plot.boundary == "periodic")
             self.mechanics = Mechanics(spec, self.species, self.pipe_exponent, plot)
+        self.dead_wood: DeadWood | None = None
+        if scenario.mortality.snags:
+            self.dead_wood = DeadWood(self.species, scenario.seed)
+            self.memories["deadwood"] = self.dead_wood
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -131,6 +147,7 @@ class Stand(management.Hand):
         """
         self._clock = time.perf_counter()
         self.climate.check_known(self.year + 1)
+        mortality.check_due(self)
         management.act(self, self._traits)
         self._lap("act")
         self.steps += 1
@@ -154,7 +171,10 @@ class Stand(management.Hand):
         return record
 
     def _expose(self) -> None:
-        self.surroundings.expose(self.arena.metamers, self.rows, self.steps)
+        dead = None
+        if self.dead_wood is not None:
+            dead = self.dead_wood.plant_area(self.steps, self.surroundings.voxel_m)
+        self.surroundings.expose(self.arena.metamers, self.rows, self.steps, dead)
         self._lap("expose")
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
@@ -243,9 +263,9 @@ class Stand(management.Hand):
             self._full_light,
             self._ring_heights,
         )
-        deaths: list[Death] = []
-        if not self._paper:
-            deaths = starved(self.rows, measures.buds, self._traits.of["suppression_years"])
+        deaths = mortality.deaths_of(self, measures)
+        if self.dead_wood is not None:
+            self.dead_wood.pass_year(self, deaths, measures)
         self._lap("measure")
         return measures, deaths
 
@@ -312,6 +332,13 @@ class Stand(management.Hand):
         }
         columns.update(measures.columns())
         return pd.DataFrame(columns)
+
+    @property
+    def snags(self) -> pd.DataFrame:
+        """The dead trees that stand now, a row each; none where the scenario has no snags."""
+        import pandas as pd
+
+        return pd.DataFrame(snag_columns(self))
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""

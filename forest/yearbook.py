@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.dynamics.mortality import Death
+from forest.dynamics.snags import Snags
 from forest.growth import budget
 from forest.measure.rings import RingYear, breast_ring_widths, ring_rows
 from forest.measure.stand import Flows, Plot, stand_rows
@@ -146,6 +147,9 @@ def record_year(
     }
     if stand.mechanics is not None:
         tables["stability"] = _stability_rows(stand, living)
+    if stand.dead_wood is not None:
+        hectares = plot.size_m[0] * plot.size_m[1] / _SQUARE_METRES_PER_HECTARE
+        tables["deadwood"] = stand.dead_wood.columns(stand.year, hectares)
     treatments = stand.treatments.columns()
     if treatments:
         tables["treatments"] = treatments
@@ -197,6 +201,22 @@ def _stability_rows(stand: Stand, trees: table.Trees) -> Columns:
         "tree_id": trees.tree_id,
         "species": trees.species,
         **found._asdict(),
+    }
+
+
+def snag_columns(stand: Stand) -> Columns:
+    """Give the snags that stand now, by column."""
+    snags = Snags.none() if stand.dead_wood is None else stand.dead_wood.snags
+    return {
+        "tree_id": snags.tree_id,
+        "species": np.array([stand.species_names[k] for k in snags.species], object),
+        "x_m": snags.x,
+        "y_m": snags.y,
+        "dbh_cm": snags.dbh_cm,
+        "height_m": snags.height_m,
+        "volume_m3": snags.volume_m3,
+        "mass_kg": snags.mass_kg,
+        "death_year": stand.scenario.start_year + snags.death_step - 1,
     }
 
 

@@ -24,8 +24,30 @@ CAUSES = (
     "thinning",
     "harvest",
     "no_buds",
+    "fire",
+    "insects",
+    "disease",
+    "browsing",
+    "drought",
+    "other",
+    "tending",
 )
 
+#: What trees die of where they stand, and why trees are felled: columns of `Run.ledger`.
+DEATH_CAUSES = (
+    "suppression",
+    "no_buds",
+    "age",
+    "background",
+    "buckling",
+    "fire",
+    "insects",
+    "disease",
+    "browsing",
+    "drought",
+    "other",
+)
+FELLING_CAUSES = ("thinning", "harvest", "tending")
 ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest")
 STAGES = ("before", "after")
 
@@ -229,6 +251,30 @@ STABILITY = Table(
     ),
 )
 
+_WOOD_OF = "of the stems, less what has decayed"
+_MASS_OF = "of stems and branches, less what has decayed"
+
+DEADWOOD = Table(
+    "a year and species, and one for all species, where the scenario has snags",
+    (
+        _YEAR,
+        _SPECIES_OR_ALL,
+        _stand("snags_ha", "1/ha", "dead trees that stand"),
+        _stand("new_snags_ha", "1/ha", "trees that died in the year and stand"),
+        _stand("fallen_snags_ha", "1/ha", "snags that fell in the year"),
+        _stand("standing_m3ha", "m3/ha", f"snags: volume {_WOOD_OF}"),
+        _stand("lying_m3ha", "m3/ha", f"lying dead wood: volume {_WOOD_OF}"),
+        _stand("input_m3ha", "m3/ha", "volume of the trees that died in the year"),
+        _stand("fallen_m3ha", "m3/ha", "what came from standing to lying in the year"),
+        _stand("decayed_m3ha", "m3/ha", "what decayed in the year"),
+        _stand("standing_tha", "t/ha dry mass", f"snags: mass {_MASS_OF}"),
+        _stand("lying_tha", "t/ha dry mass", f"lying dead wood: mass {_MASS_OF}"),
+        _stand("input_tha", "t/ha dry mass", "mass of the trees that died in the year"),
+        _stand("fallen_tha", "t/ha dry mass", "what came from standing to lying in the year"),
+        _stand("decayed_tha", "t/ha dry mass", "what decayed in the year"),
+    ),
+)
+
 CLIMATE = Table(
     "a year and species: the year's climate, and what the species makes of it",
     (
@@ -276,6 +322,7 @@ TABLES: dict[str, Table] = {
     "rings": RINGS,
     "carbon": CARBON,
     "stability": STABILITY,
+    "deadwood": DEADWOOD,
     "climate": CLIMATE,
     "treatments": TREATMENTS,
 }

@@ -92,6 +92,11 @@ def _number(
     return value
 
 
+def read_rows(file: str, context: Any) -> list[tuple[int, dict[str, str]]]:
+    """Read the line number and the cells, by column, of every row of a CSV file."""
+    return list(_rows(file, context, ()))
+
+
 def read_stem_map(
     file: str, default_species: str, context: Any
 ) -> list[tuple[int, float, float, str]]:

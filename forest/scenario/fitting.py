@@ -10,6 +10,7 @@ from forest.scenario.acts import check_acts
 from forest.scenario.climate import check_covered
 from forest.scenario.complete import check_spots
 from forest.scenario.model import Explicit, Random, Regular
+from forest.scenario.mortality import check_mortality
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -31,6 +32,13 @@ def check_fit(scenario: Scenario) -> None:
     shares = {name: use.share for name, use in scenario.species.items()}
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.calendar, regular)
+    check_mortality(
+        scenario.mortality,
+        mechanics=scenario.mechanics is not None,
+        plot=scenario.plot,
+        species=scenario.species,
+        years=scenario.calendar,
+    )
 
 
 def _wind_has_a_price(scenario: Scenario) -> None:

@@ -19,7 +19,7 @@ _DiscHeight = Annotated[float, Field(gt=0, le=150)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
 _TableName = Literal[
-    "trees", "stand", "events", "rings", "carbon", "stability", "climate", "treatments"
+    "trees", "stand", "events", "rings", "carbon", "stability", "climate", "deadwood", "treatments"
 ]
 
 
@@ -360,11 +360,21 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        ("trees", "stand", "events", "rings", "carbon", "stability", "climate", "treatments"),
-        "tables to write; stability only has rows where there is a table mechanics, treatments "
-        "where there are acts",
+        (
+            "trees",
+            "stand",
+            "events",
+            "rings",
+            "carbon",
+            "stability",
+            "climate",
+            "deadwood",
+            "treatments",
+        ),
+        "tables to write; stability only has rows where there is a table mechanics, deadwood "
+        "where there are snags, treatments where there are acts",
         unit="",
-        max_length=8,
+        max_length=9,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(

@@ -33,6 +33,7 @@ from forest.scenario.model import (
     SpeciesUse,
     StemMap,
 )
+from forest.scenario.mortality import Mortality
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
 from forest.species.text import input_error, parse_toml, read_text, to_toml
@@ -71,6 +72,7 @@ class Scenario(Table):
     climate: Climate = Climate()
     growth: Growth = Growth()
     mechanics: Mechanics | None = None
+    mortality: Mortality = Mortality()
     environment: Environment
     species: dict[str, SpeciesUse] = quantity(
         ...,

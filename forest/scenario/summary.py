@@ -40,6 +40,7 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("environment", " + ".join(parts)),
         ("bud fate", scenario.growth.bud_fate),
         ("mechanics", _mechanics(scenario)),
+        ("mortality", _mortality(scenario)),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
         ("acts", _acts(scenario)),
         ("seed", str(scenario.seed)),
@@ -69,6 +70,16 @@ def _mechanics(scenario: Scenario) -> str:
     how = f"bending, righting {mechanics.righting}" if mechanics.bending else "stability alone"
     answered = ", answered by growth" if mechanics.wind_growth else ""
     return f"{how}, wind {mechanics.wind_m_s:g} m/s{answered}"
+
+
+def _mortality(scenario: Scenario) -> str:
+    mortality = scenario.mortality
+    causes = [key for key in ("age", "background", "buckling") if getattr(mortality, key)]
+    if mortality.events:
+        causes.append(f"{len(mortality.events)} disturbances")
+    kept = "; snags and dead wood" if mortality.snags else ""
+    paper = scenario.mode == "paper"
+    return (", ".join([*([] if paper else ["suppression"]), *causes]) or "none") + kept
 
 
 def _acts(scenario: Scenario) -> str:

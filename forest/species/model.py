@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from forest.errors import nearest
 from forest.species.curves import Curve, FactorCurve
+from forest.species.mortality import Mortality
 from forest.species.response import Response
 from forest.species.schema import Refusal, Table, quantity
 
@@ -368,6 +369,7 @@ SECTIONS: dict[str, type[Table]] = {
     "balance": Balance,
     "mechanics": Mechanics,
     "mensuration": Mensuration,
+    "mortality": Mortality,
     "response": Response,
 }
 
@@ -391,6 +393,7 @@ class Species(Table):
     balance: Balance = Balance()
     mechanics: Mechanics = Mechanics()
     mensuration: Mensuration = Mensuration()
+    mortality: Mortality = Mortality()
     response: Response = Response()
     sources: dict[str, dict[str, str]] = Field(
         default={},
