@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest import establishment
+from forest.dynamics.snags import is_left
 from forest.errors import InputError, nearest
 from forest.management.plan import Felling, Places, plan_year
 from forest.management.treatments import stand_now
@@ -99,6 +100,8 @@ def fell(stand: Stand, act: int, felling: Felling, measures: TreeMeasures) -> Tr
     alive[rows] = False
     before = stand_now(stand, measures)
     after = stand_now(stand, measures, alive, rows)
+    if stand.dead_wood is not None and is_left("felled", felling.cause):
+        stand.dead_wood.leave(stand, rows.tolist(), measures)
     for row in rows.tolist():
         stand.pending.append(Event.of(stand, row, "felled", felling.cause, measures))
         start, size = int(stand.rows.start[row]), int(stand.rows.size[row])

@@ -133,7 +133,7 @@ class Hand:
         census = census_of(stand, measures)
         standing = np.ones(len(census.tree_id), np.bool_)
         rows = to_thin(checked, census, stand, standing, stand.treatments.number + 1)
-        felling = Felling("thin", census.tree_id[np.sort(rows)].tolist(), "thinning")
+        felling = Felling("thin", census.tree_id[np.sort(rows)].tolist(), checked.cause)
         doing.fell(stand, BY_HAND, felling, measures)
         return felling.tree_ids
 

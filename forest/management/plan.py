@@ -169,7 +169,7 @@ def _felling(
         return Felling("fell", list(dict.fromkeys(ids)), act.cause)
     if isinstance(act, Thin):
         chosen = to_thin(act, census, stand, standing, number)
-        return Felling("thin", census.tree_id[np.sort(chosen)].tolist(), "thinning")
+        return Felling("thin", census.tree_id[np.sort(chosen)].tolist(), act.cause)
     assert not isinstance(act, Prune | Plant)
     chosen = to_harvest(act, census, stand, standing)
     return Felling("harvest", census.tree_id[chosen].tolist(), "harvest")

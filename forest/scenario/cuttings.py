@@ -76,6 +76,9 @@ class Thinning(Rule):
         "strips; selective: what presses crop trees",
         unit="",
     )
+    cause: Literal["thinning", "tending"] = quantity(
+        "thinning", "why, in the events; what tending fells is left lying", unit=""
+    )
     n_ha: float | None = quantity(None, "trees left", unit="1/ha", ge=0, le=_DENSEST)
     basal_area_m2ha: float | None = quantity(None, "basal area left", unit="m2/ha", ge=0, le=1000)
     sdi: float | None = quantity(

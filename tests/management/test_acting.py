@@ -125,6 +125,19 @@ def test_targets_are_met_and_ids_told() -> None:
     assert causes == ["thinning"] * 3 + ["harvest"] * (len(inside) + len(clearcut))
 
 
+def test_tending_leaves_its_trees() -> None:
+    """Young trees felled and left are dead wood on the ground; thinned ones are taken away."""
+    for cause, left in (("thinning", False), ("tending", True)):
+        stand = Stand(tiny("mortality={snags=true}"))
+        steps(stand, 6)
+        gone = stand.thin(method="above", share_n=0.3, cause=cause)
+        (record,) = steps(stand, 1)
+        assert (record.tables["deadwood"]["input_tha"].sum() > 0.0) == left
+        events = record.tables["events"]
+        causes = events["cause"][np.isin(events["tree_id"], gone)]
+        assert [CAUSES[code] for code in causes] == [cause] * 3
+
+
 def test_crop_trees_stay_until_the_target() -> None:
     """Three of ten trees go, those that press the thickest most; it stays."""
     stand = Stand(tiny())
