@@ -109,7 +109,7 @@ def simulate(
     with _threads(threads) as count, announce_compiling(compiling):
         # The stand comes before the file: if it cannot be built, the file is left as it was.
         if checkpoint is None:
-            stand = Stand(scenario)
+            stand = Stand(scenario, observer.say)
             writer = _create(scenario, out, count, command, overwrite)
         else:
             arrays, meta = checkpoint

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -22,10 +23,13 @@ from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds
+from forest.inventory import Built, settle
 from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
+from forest.regeneration import Regeneration
+from forest.scenario.inventory import Inventory
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
@@ -52,6 +56,8 @@ class Stand(management.Hand):
     ----------
     scenario : Scenario
         What to grow, and where.
+    say : callable, optional
+        Told how the nursery goes on where the stand starts from an inventory.
 
     Attributes
     ----------
@@ -75,8 +81,12 @@ class Stand(management.Hand):
         What bends and holds the trees, where the scenario has mechanics.
     climate : Climate
         What each year is like, and what the species make of it.
+    regeneration : Regeneration or None
+        Seeds and seedlings, where the scenario has regeneration.
     surroundings : Surroundings
         Light and space.
+    built : Built or None
+        How near the first trees are to the inventory that they were built from.
     treatments : Treatments
         What acts changed since the last record.
     dead_wood : DeadWood or None
@@ -87,8 +97,14 @@ class Stand(management.Hand):
         Wall time spent in each phase of the year so far.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    built: Built | None = None
+
+    def __init__(self, scenario: Scenario, say: Callable[[str], None] = lambda _: None) -> None:
         self._start(scenario)
+        if isinstance(scenario.planting, Inventory):
+            self.built = settle(self, scenario.planting, Stand, say)
+            management.check_due(self)
+            return
         first = establishment.Newcomers.planted(
             *scenario.planting_positions(), headings(*scenario.planting_leans())
         )
@@ -125,6 +141,10 @@ class Stand(management.Hand):
         if scenario.mortality.snags:
             self.dead_wood = DeadWood(self.species, scenario.seed)
             self.memories["deadwood"] = self.dead_wood
+        self.regeneration: Regeneration | None = None
+        if scenario.regeneration is not None and self.surroundings.canopy is not None:
+            self.regeneration = Regeneration(scenario, self.surroundings.canopy)
+            self.memories["regeneration"] = self.regeneration
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -166,8 +186,13 @@ class Stand(management.Hand):
         self._bend()
         measures, deaths = self._die()
         record = record_year(self, measures, deaths, accounts, before, rings)
+        grown = self.rows
         self._bury(deaths, measures)
         self._lap("record")
+        if self.regeneration is not None:
+            seedlings = self.regeneration.year(self, grown, measures, deaths, self._traits)
+            record.tables["regeneration"] = seedlings
+            self._lap("regenerate")
         return record
 
     def _expose(self) -> None:

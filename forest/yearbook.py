@@ -39,17 +39,26 @@ class Event(NamedTuple):
     volume_m3: float
 
     @classmethod
-    def of(cls, stand: Stand, row: int, kind: str, cause: str, measures: TreeMeasures) -> Event:
-        """Note an event of the tree in a row of the table."""
+    def of(
+        cls,
+        stand: Stand,
+        row: int,
+        kind: str,
+        cause: str,
+        measures: TreeMeasures,
+        place: int | None = None,
+    ) -> Event:
+        """Note an event of the tree in a row of the table, whose measures may stand elsewhere."""
+        place = row if place is None else place
         return cls(
             int(stand.rows.tree_id[row]),
             int(stand.rows.species[row]),
             kind,
             cause,
             int(stand.rows.mother_id[row]),
-            float(measures.dbh_cm[row]),
-            float(measures.height_m[row]),
-            float(measures.stem_volume_m3[row]),
+            float(measures.dbh_cm[place]),
+            float(measures.height_m[place]),
+            float(measures.stem_volume_m3[place]),
         )
 
 
@@ -81,7 +90,8 @@ class YearRecord(NamedTuple):
         Calendar year.
     tables : dict of table to columns
         The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`, where
-        the scenario has mechanics `/stability`, and where acts were done `/treatments`.
+        the scenario has them `/stability`, `/deadwood` and `/regeneration`, and where acts were
+        done `/treatments`.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """

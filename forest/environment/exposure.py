@@ -277,6 +277,11 @@ class Light:
             mode=self._mode,
         )
 
+    @property
+    def canopy(self) -> Canopy | None:
+        """The far field."""
+        return self._canopy
+
     def floor_light(self) -> float:
         """Mean relative irradiance at the ground of the plot, 0 to 1; NaN without a far field."""
         return self._canopy.floor_light() if self._canopy else float("nan")

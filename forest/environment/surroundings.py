@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.environment.canopy import Canopy
 from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
 from forest.environment.marker_buds import BudSpace, apply_space
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
@@ -146,6 +147,11 @@ class Surroundings:
         serial = metamers.serial[trees.start[row] + shoots.metamer]
         wanted = _key(trees.tree_id[row], serial, shoots.bud)
         return direction[np.searchsorted(keys, wanted)]
+
+    @property
+    def canopy(self) -> Canopy | None:
+        """The far field, where the scenario has one."""
+        return self._light.canopy
 
     def floor_light(self) -> float:
         """Mean relative irradiance at the ground, 0..1; NaN without a far field."""

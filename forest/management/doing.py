@@ -100,6 +100,8 @@ def fell(stand: Stand, act: int, felling: Felling, measures: TreeMeasures) -> Tr
     alive[rows] = False
     before = stand_now(stand, measures)
     after = stand_now(stand, measures, alive, rows)
+    if stand.regeneration is not None:
+        stand.regeneration.note_stumps(stand.rows, rows.tolist(), measures)
     if stand.dead_wood is not None and is_left("felled", felling.cause):
         stand.dead_wood.leave(stand, rows.tolist(), measures)
     for row in rows.tolist():

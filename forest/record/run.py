@@ -124,6 +124,11 @@ class Run:
         return self._frame("climate")
 
     @property
+    def regeneration(self) -> pd.DataFrame:
+        """A row per year and species, where the scenario has regeneration: seeds and seedlings."""
+        return self._frame("regeneration")
+
+    @property
     def treatments(self) -> pd.DataFrame:
         """The stand before and after each act: the columns of `stand`, as the acts left it."""
         return self._frame("treatments")

@@ -288,6 +288,27 @@ CLIMATE = Table(
     ),
 )
 
+REGENERATION = Table(
+    "a year and species, where the scenario has regeneration",
+    (
+        _YEAR,
+        _SPECIES,
+        _stand("mast", "", "factor of the year on the species' seeds; 1 in the mean"),
+        _stand("seeds_ha", "1/ha", "viable seeds that are expected to fall"),
+        _stand("germinated_ha", "1/ha", "seedlings that outlived their first summer"),
+        _stand("sprouts_ha", "1/ha", "sprouts from stumps"),
+        _stand("died_ha", "1/ha", "older seedlings that died in the year's light"),
+        _stand("crowded_ha", "1/ha", "seedlings that found no room"),
+        _stand("recruits_ha", "1/ha", "seedlings that became trees; their events are next year's"),
+        _stand("n_ha", "1/ha", "seedlings at the end of the year"),
+        _stand("n_low_ha", "1/ha", "those below 0.1 m"),
+        _stand("n_high_ha", "1/ha", "those of 0.5 m and more"),
+        _stand("mean_height_m", "m", "their mean height"),
+        _stand("lai", "m2/m2", "their leaf area index, one-sided"),
+        _stand("reserve_kg_ha", "kg dry mass/ha", "what they have stored"),
+    ),
+)
+
 TREATMENTS = Table(
     "a treatment (an act that was done), before and after it, and species, and one for all species",
     (
@@ -324,6 +345,7 @@ TABLES: dict[str, Table] = {
     "stability": STABILITY,
     "deadwood": DEADWOOD,
     "climate": CLIMATE,
+    "regeneration": REGENERATION,
     "treatments": TREATMENTS,
 }
 

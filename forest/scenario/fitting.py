@@ -9,8 +9,10 @@ from forest.scenario import placing
 from forest.scenario.acts import check_acts
 from forest.scenario.climate import check_covered
 from forest.scenario.complete import check_spots
+from forest.scenario.inventory import Inventory
 from forest.scenario.model import Explicit, Random, Regular
 from forest.scenario.mortality import check_mortality
+from forest.scenario.regeneration import check_regeneration
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -29,6 +31,13 @@ def check_fit(scenario: Scenario) -> None:
     _grid_fits(scenario)
     _trees_fit(scenario)
     check_covered(scenario.climate, scenario.calendar)
+    check_regeneration(
+        scenario.regeneration,
+        mode=scenario.mode,
+        environment=scenario.environment,
+        species=scenario.species,
+        planted=not isinstance(scenario.planting, Explicit) or bool(scenario.planting.trees),
+    )
     shares = {name: use.share for name, use in scenario.species.items()}
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.calendar, regular)
@@ -100,6 +109,8 @@ def _trees_fit(scenario: Scenario) -> None:
     planting, size = scenario.planting, scenario.plot.size_m
     if isinstance(planting, Explicit):
         _check_trees(scenario, planting)
+    elif isinstance(planting, Inventory):
+        return  # its trees were checked when they were read
     elif not any(use.share > 0 for use in scenario.species.values()):
         raise Refusal("every share is 0", key="species", expected="a share above 0")
     elif isinstance(planting, Random):

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from forest.errors import nearest
 from forest.species.curves import Curve, FactorCurve
 from forest.species.mortality import Mortality
+from forest.species.regeneration import Regeneration
 from forest.species.response import Response
 from forest.species.schema import Refusal, Table, quantity
 
@@ -160,6 +161,14 @@ class Carbon(Table):
     light_use_efficiency_kg_m2: float = quantity(
         1.3, "yearly income per leaf area at full light (epsilon)", unit="kg/m2", gt=0, le=20
     )
+    light_half_saturation: float = quantity(
+        0.0,
+        "light, as a share of full light, at which leaves earn half of what endless light would "
+        "give; the less, the more tolerant of shade (Pacala et al. 1996); 0 = income in proportion "
+        "to light",
+        ge=0,
+        le=100,
+    )
     maintenance_per_year: float = quantity(
         0.01, "upkeep as a share of the sapwood's mass", unit="1/year", ge=0, le=1
     )
@@ -177,6 +186,14 @@ class Carbon(Table):
         30.0,
         "path from the ground at which hydraulic limitation halves income "
         "(Ryan and Yoder 1997); 0 = off",
+        unit="m",
+        ge=0,
+        le=10000,
+    )
+    turgor_limit_m: float = quantity(
+        0.0,
+        "height at which water tension leaves new internodes no length: they shorten linearly "
+        "towards it (Koch et al. 2004); 0 = off",
         unit="m",
         ge=0,
         le=10000,
@@ -371,6 +388,7 @@ SECTIONS: dict[str, type[Table]] = {
     "mensuration": Mensuration,
     "mortality": Mortality,
     "response": Response,
+    "regeneration": Regeneration,
 }
 
 
@@ -395,6 +413,7 @@ class Species(Table):
     mensuration: Mensuration = Mensuration()
     mortality: Mortality = Mortality()
     response: Response = Response()
+    regeneration: Regeneration = Regeneration()
     sources: dict[str, dict[str, str]] = Field(
         default={},
         description="where each value comes from: a table of texts per section",
