@@ -129,6 +129,11 @@ class Run:
         return self._frame("regeneration")
 
     @property
+    def treatments(self) -> pd.DataFrame:
+        """The stand before and after each act: the columns of `stand`, as the acts left it."""
+        return self._frame("treatments")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")

@@ -29,6 +29,7 @@ _TableName = Literal[
     "climate",
     "deadwood",
     "regeneration",
+    "treatments",
 ]
 
 
@@ -382,11 +383,13 @@ class Output(Table):
             "climate",
             "deadwood",
             "regeneration",
+            "treatments",
         ),
         "tables to write; stability only has rows where there is a table mechanics, deadwood "
-        "where there are snags, regeneration where there is a table of that name",
+        "where there are snags, regeneration where there is a table of that name, treatments "
+        "where there are acts",
         unit="",
-        max_length=9,
+        max_length=10,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(
