@@ -93,11 +93,25 @@ def fell(stand: Stand, tree_ids: Sequence[int], cause: str) -> None:
     if cause not in CAUSES:
         raise InputError(f"unknown cause '{cause}', {nearest(cause, CAUSES)}", where="Stand.fell")
     rows = [stand.row_of(tree_id) for tree_id in tree_ids]
+    take_out(stand, rows, "felled", cause)
+
+
+def take_out(stand: Stand, rows: Sequence[int], kind: str, cause: str) -> None:
+    """Take trees out of the table between two years, with an event each.
+
+    Parameters
+    ----------
+    stand : Stand
+    rows : sequence of int
+        Rows of the table; one named twice goes once.
+    kind, cause : str
+        As in `/events`.
+    """
     measures = stand.measure()
     alive = np.ones(len(stand.rows.tree_id), np.bool_)
     for row in rows:
         if alive[row]:
-            stand.pending.append(Event.of(stand, row, "felled", cause, measures))
+            stand.pending.append(Event.of(stand, row, kind, cause, measures))
             start, size = int(stand.rows.start[row]), int(stand.rows.size[row])
             _note_loss(stand, row, stand.arena.metamers.serial[start : start + size])
         alive[row] = False

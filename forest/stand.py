@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from forest import establishment, management
 from forest.dynamics.mortality import Death, starved
 from forest.dynamics.planting import headings
+from forest.dynamics.storms import Storms
 from forest.dynamics.weather import income_factor
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
@@ -67,6 +68,8 @@ class Stand:
         What bends and holds the trees, where the scenario has mechanics.
     surroundings : Surroundings
         Light and space.
+    storms : Storms
+        The winds that throw trees.
     memories : dict of str to Memory
         The parts that remember something between years, for checkpoints.
     seconds : dict of str to float
@@ -95,7 +98,11 @@ class Stand:
         self._pipes_before = np.empty(0, np.float32)
         self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
-        self.memories: dict[str, Memory] = {"surroundings": self.surroundings}
+        self.storms = Storms(scenario, self.pipe_exponent)
+        self.memories: dict[str, Memory] = {
+            "surroundings": self.surroundings,
+            "storms": self.storms,
+        }
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
@@ -237,6 +244,7 @@ class Stand:
         deaths: list[Death] = []
         if not self._paper:
             deaths = starved(self.rows, measures.buds, self._traits.of["suppression_years"])
+        deaths = self.storms.of_year(self, measures, deaths)
         self._lap("measure")
         return measures, deaths
 
@@ -348,6 +356,23 @@ class Stand:
         branch_pipe = self._traits.of["branch_pipe"]
         return management.prune(self, tree_id, metamer, branches, branch_pipe)
 
+    def blow(self, speed_m_s: float, direction_deg: float = 0.0) -> list[int]:
+        """Let a storm break and uproot trees at once; see `forest.dynamics.storms.Storms.blow`.
+
+        Parameters
+        ----------
+        speed_m_s : float
+            Mean wind at the height of the canopy's top over open land, m/s.
+        direction_deg : float
+            Azimuth towards which it blows, from x towards y.
+
+        Returns
+        -------
+        list of int
+            Ids of the trees that fell.
+        """
+        return self.storms.blow(self, speed_m_s, direction_deg)
+
     # ------------------------------------------------------------------ what it is now
 
     @property
@@ -384,6 +409,16 @@ class Stand:
         }
         columns.update(measures.columns())
         return pd.DataFrame(columns)
+
+    def critical_wind(self, direction_deg: float = 0.0) -> pd.DataFrame:
+        """The storms of a direction that the trees would not stand; none falls.
+
+        A row per tree of at least `wind.from_height_m`, with the columns of `/storms` that need no
+        storm.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(self.storms.critical(self, direction_deg))
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""

@@ -79,7 +79,8 @@ class YearRecord(NamedTuple):
     year : int
         Calendar year.
     tables : dict of table to columns
-        The year's rows of `/trees`, `/stand`, `/events`, `/rings` and `/carbon`.
+        The year's rows of `/trees`, `/stand`, `/events`, `/rings` and `/carbon`, and of `/stability`
+        and `/storms` where there are any.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """
@@ -144,6 +145,9 @@ def record_year(
     }
     if stand.mechanics is not None:
         tables["stability"] = _stability_rows(stand, living)
+    blown = stand.storms.take(stand.year)
+    if blown:
+        tables["storms"] = blown
     return YearRecord(stand.year, tables, _sample_years(stand, deaths, serials_before))
 
 

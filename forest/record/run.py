@@ -119,6 +119,11 @@ class Run:
         return self._frame("stability")
 
     @property
+    def storms(self) -> pd.DataFrame:
+        """A row per tree and storm: the winds that it does not stand, and whether it stood."""
+        return self._frame("storms")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")

@@ -9,6 +9,7 @@ from forest.scenario import placing
 from forest.scenario.acts import check_acts
 from forest.scenario.complete import check_spots
 from forest.scenario.model import Explicit, Random, Regular
+from forest.scenario.wind import check_wind
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def check_fit(scenario: Scenario) -> None:
     _picture_fits(scenario)
     _grid_fits(scenario)
     _trees_fit(scenario)
+    check_wind(scenario)
     check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
 
 

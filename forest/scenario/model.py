@@ -18,7 +18,7 @@ _Extent = Annotated[float, Field(gt=0, le=1e5)]
 _DiscHeight = Annotated[float, Field(gt=0, le=150)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
-_TableName = Literal["trees", "stand", "events", "rings", "carbon", "stability"]
+_TableName = Literal["trees", "stand", "events", "rings", "carbon", "stability", "storms"]
 
 
 class Plot(Table):
@@ -385,10 +385,11 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        ("trees", "stand", "events", "rings", "carbon", "stability"),
-        "tables to write; stability only has rows where there is a table mechanics",
+        ("trees", "stand", "events", "rings", "carbon", "stability", "storms"),
+        "tables to write; stability only has rows where there is a table mechanics, storms where "
+        "the wind blew",
         unit="",
-        max_length=6,
+        max_length=7,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(

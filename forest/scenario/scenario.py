@@ -33,6 +33,7 @@ from forest.scenario.model import (
     StemMap,
     Weather,
 )
+from forest.scenario.wind import Wind
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
 from forest.species.text import input_error, parse_toml, read_text, to_toml
@@ -71,6 +72,7 @@ class Scenario(Table):
     weather: Weather = Weather()
     growth: Growth = Growth()
     mechanics: Mechanics | None = None
+    wind: Wind | None = None
     environment: Environment
     species: dict[str, SpeciesUse] = quantity(
         ...,

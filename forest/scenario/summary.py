@@ -8,6 +8,8 @@ from forest.scenario.scenario import Scenario
 
 #: Acts that are named one by one.
 _MOST_ACTS = 6
+#: Storms that are named one by one.
+_MOST_STORMS = 6
 
 
 def summary(scenario: Scenario) -> list[tuple[str, str]]:
@@ -39,6 +41,7 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("environment", " + ".join(parts)),
         ("bud fate", scenario.growth.bud_fate),
         ("mechanics", _mechanics(scenario)),
+        ("wind", _wind(scenario)),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
         ("acts", _acts(scenario)),
         ("seed", str(scenario.seed)),
@@ -54,6 +57,17 @@ def _mechanics(scenario: Scenario) -> str:
     how = f"bending, righting {mechanics.righting}" if mechanics.bending else "stability alone"
     answered = ", answered by growth" if mechanics.wind_growth else ""
     return f"{how}, wind {mechanics.wind_m_s:g} m/s{answered}"
+
+
+def _wind(scenario: Scenario) -> str:
+    wind = scenario.wind
+    if wind is None:
+        return "none"
+    parts = [f"{s.year} {s.speed_m_s:g} m/s" for s in wind.storms[:_MOST_STORMS]]
+    parts += [f"{len(wind.storms) - _MOST_STORMS} more"] if len(wind.storms) > _MOST_STORMS else []
+    if wind.yearly is not None:
+        parts.append(f"every year about {wind.yearly.mode_m_s:g} m/s")
+    return ", ".join(parts) or "no storms"
 
 
 def _acts(scenario: Scenario) -> str:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from forest.errors import nearest
+from forest.species.anchorage import Anchorage
 from forest.species.schema import Refusal, Table, quantity
 
 
@@ -374,6 +375,7 @@ SECTIONS: dict[str, type[Table]] = {
     "balance": Balance,
     "mechanics": Mechanics,
     "mensuration": Mensuration,
+    "anchorage": Anchorage,
 }
 
 
@@ -396,6 +398,7 @@ class Species(Table):
     balance: Balance = Balance()
     mechanics: Mechanics = Mechanics()
     mensuration: Mensuration = Mensuration()
+    anchorage: Anchorage = Anchorage()
     sources: dict[str, dict[str, str]] = Field(
         default={},
         description="where each value comes from: a table of texts per section",
