@@ -168,12 +168,17 @@ def _counts(other_height, height):  # type: ignore[no-untyped-def]
 
 @njit
 def _space_of(row, height, standing, ways):  # type: ignore[no-untyped-def]
-    """The spacing of the trees around one of them."""
+    """The spacing of the trees around one of them, on the side where more of them stand.
+
+    So trees at an edge are as close as those behind them.
+    """
     reach = HALF_WIDTH * ways.canopy_height
     u = ways.along[row]
     v = ways.across[row]
     strip = int((v - ways.low) / reach)
-    trees = 1.0
+    ahead = 0.0
+    behind = 0.0
+    beside = 0.0
     for at in range(max(strip - 1, 0), min(strip + 2, len(ways.first) - 1)):
         end = ways.first[at + 1]
         for k in range(_from(ways.other_along, ways.first[at], end, u - reach), end):
@@ -183,13 +188,23 @@ def _space_of(row, height, standing, ways):  # type: ignore[no-untyped-def]
                 break
             square = du * du + dv * dv
             if standing[ways.other[k]] and 0.0 < square <= reach * reach:
-                trees += _counts(height[ways.other[k]], height[row])
+                one = _counts(height[ways.other[k]], height[row])
+                if du > 0.0:
+                    ahead += one
+                elif du < 0.0:
+                    behind += one
+                else:
+                    beside += one
+    trees = 1.0 + beside + 2.0 * max(ahead, behind)
     return min(reach * np.sqrt(np.pi / trees), WIDEST * ways.canopy_height)
 
 
 @njit
 def _gather(row, height, standing, spacing, ways, cover, decay):  # type: ignore[no-untyped-def]
-    """Add up what covers each stretch of the way to a tree, m, and the logarithm of its E."""
+    """Add up what covers each stretch of the way to a tree, m, and the logarithm of its E.
+
+    A tree counts in the two stretches whose middles are nearest.
+    """
     canopy = ways.canopy_height
     reach = HALF_WIDTH * canopy
     u = ways.along[row]
@@ -206,9 +221,14 @@ def _gather(row, height, standing, spacing, ways, cover, decay):  # type: ignore
                 continue
             length = _counts(height[other], height[row]) * spacing[other] ** 2 / (2.0 * reach)
             close = max(spacing[other] / canopy, CLOSEST)
-            b = min(int(distance / (STRETCH * canopy)), _STRETCHES - 1)
-            cover[b] += length
-            decay[b] += length / canopy * np.log(1.1127 * close + 0.0311)
+            rate = np.log(1.1127 * close + 0.0311) / canopy
+            middle = min(max(distance / (STRETCH * canopy) - 0.5, 0.0), _STRETCHES - 1.0)
+            b = min(int(middle), _STRETCHES - 2)
+            farther = middle - b
+            cover[b] += (1.0 - farther) * length
+            cover[b + 1] += farther * length
+            decay[b] += (1.0 - farther) * length * rate
+            decay[b + 1] += farther * length * rate
 
 
 @njit
@@ -289,7 +309,8 @@ def expose(
 
     Notes
     -----
-    A tree's spacing s is that of the trees within half a canopy height, and each covers s^2 of the
+    A tree's spacing s is that of the trees within half a canopy height before or behind it,
+    whichever are closer, and each covers s^2 of the
     ground of the way, which is one canopy height wide. A tree upwind counts in full if it is
     at least as tall, not at all if half as tall or less, linearly between. sqrt(m), per that of
     a lone tree, is the wind at `DRAG_HEIGHT`; it falls downwards as exp(-a (1 - z / h)) with

@@ -1,7 +1,7 @@
 """The winds that break a stem or turn its root plate over.
 
 A storm's gusts load the crown with the mean wind's drag times `GUST`. The stem breaks where the
-bending stress reaches the modulus of rupture; the tree is uprooted when the moment at the ground
+bending stress in its lower third reaches the modulus of rupture; the tree is uprooted when the moment at the ground
 reaches what tree pulling found, a multiple of the fresh mass of the stem (Gardiner et al. 2000).
 """
 
@@ -15,19 +15,20 @@ from numpy.typing import NDArray
 from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.growth.dealing import BINS, FLOATS, INTEGERS, Deal, Scratch
-from forest.mechanics.stability import buckling_factor, cut_column
-from forest.mechanics.stems import StemSpecies, stem_stations
+from forest.mechanics.stems import GRAVITY, StemSpecies, stem_stations
 from forest.mechanics.stress import PROJECTION, bending_moments, wind_forces
 from forest.trees.metamers import LATERAL, TERMINAL, Metamers
 from forest.trees.table import Trees
 
 #: Moment in the strongest gust of a storm per that of its mean wind on a lone tree. Calibrated to
 #: critical speeds of spruce stands (Gardiner et al. 2000); it stands for gusts and for sway.
-GUST = 15.0
+GUST = 15.5
 #: Winds beyond this one are not looked for, m/s.
 STRONGEST = 100.0
 #: A stem breaks below this share of its height; above, a top is lost, which is no windthrow.
-BROKEN_BELOW = 0.5
+BROKEN_BELOW = 1.0 / 3.0
+#: Rounds in which a bent stem's weight adds to its bending.
+PASSES = 6
 #: Layers into which a crown is cut, from the ground to the tree's top.
 LAYERS = 16
 _HALVINGS = 24
@@ -118,13 +119,51 @@ def layer_of(height, thick):  # type: ignore[no-untyped-def]
 
 
 @njit
+def add_sway(stem, still, moment, aside):  # type: ignore[no-untyped-def]
+    """Add the moment of the weight that a bent stem carries beside its foot.
+
+    The moments bend the stem, theta' = M / (E I), its weight moves aside and adds to them; so
+    `PASSES` times. No part leans beyond the horizontal.
+
+    Parameters
+    ----------
+    stem : Stem
+        k stations.
+    still : float64 (k,)
+        Moment at the lower end of each station as long as the stem does not bend, N m.
+    moment : float64 (k,)
+        Filled, N m.
+    aside : float64 (k + 1,)
+        Scratch.
+    """
+    n = len(still)
+    moment[:] = still
+    for _ in range(PASSES):
+        lean = 0.0
+        aside[0] = 0.0
+        for k in range(n):
+            above = moment[k + 1] if k + 1 < n else 0.0
+            turn = 0.5 * (moment[k] + above) * stem.length[k] / stem.rigidity[k]
+            middle = min(lean + 0.5 * turn, 0.5 * np.pi)
+            aside[k + 1] = aside[k] + np.sin(middle) * stem.length[k]
+            lean += turn
+        mass = 0.0
+        reach = 0.0
+        for k in range(n - 1, -1, -1):
+            mass += stem.wood[k] + stem.load[k]
+            reach += stem.wood[k] * 0.5 * (aside[k] + aside[k + 1]) + stem.load[k] * aside[k + 1]
+            moment[k] = still[k] + GRAVITY * (reach - mass * aside[k])
+
+
+@njit
 def _strain(speed, stem, tip, loads, along, rupture, anchor):  # type: ignore[no-untyped-def]
     """Stress and moment at the ground in a wind, as shares of what the tree resists."""
-    area, force, moment, profile, drag, gust = loads
+    area, force, moment, still, aside, profile, drag = loads
     wind_forces(stem.leaf_height, area, speed, profile, drag, force)
     for k in range(len(force)):
-        force[k] *= gust
-    bending_moments(stem, tip, force, along[0], along[1], moment)
+        force[k] *= GUST
+    bending_moments(stem, tip, force, along[0], along[1], still)
+    add_sway(stem, still, moment, aside)
     top = np.float64(tip[stem.metamer[len(moment) - 1], 2])
     worst = 0.0
     for k in range(len(moment)):
@@ -144,7 +183,7 @@ def critical_speeds(stem, tip, scratch, wind, drag, rupture, turning):  # type: 
         k stations.
     tip : float32 (n, 3)
         Upper ends of the tree's metamers relative to its base, m.
-    scratch : float64 (3, k)
+    scratch : float64 (5, k + 1)
         The first row holds the area of crown shown to the wind at each station, m2.
     wind : (along_x, along_y, canopy_height, share, attenuation)
         Of the tree, as in `Blow`.
@@ -157,15 +196,11 @@ def critical_speeds(stem, tip, scratch, wind, drag, rupture, turning):  # type: 
 
     Notes
     -----
-    The deflected stem's own weight adds to the wind's moment: times f / (f - 1), with f the safety
-    factor against buckling. The least speed is found by halving; that a moment grows with
-    the wind is taken for granted.
+    The least speed is found by halving; that a moment grows with the wind is taken for granted.
     """
-    factor = buckling_factor(cut_column(stem))
-    if factor <= 1.0:
-        return 0.0, 0.0
-    area, force, moment = scratch[0], scratch[1], scratch[2]
-    loads = (area, force, moment, (wind[2], wind[4]), drag, GUST * factor / (factor - 1.0))
+    n = len(stem.length)
+    area, force, moment, still = scratch[0, :n], scratch[1, :n], scratch[2, :n], scratch[3, :n]
+    loads = (area, force, moment, still, scratch[4], (wind[2], wind[4]), drag)
     along = (wind[0], wind[1])
     anchor = turning * np.sum(stem.wood)
     most = STRONGEST * wind[3]
@@ -189,7 +224,7 @@ def critical_speeds(stem, tip, scratch, wind, drag, rupture, turning):  # type: 
 
 @driver
 def _test(  # type: ignore[no-untyped-def]
-    first, step, arena, trees, shared, scratch, layers, species, turning, rigidity, blow, due, out
+    first, step, arena, trees, shared, scratch, bench, layers, species, turning, rigidity, blow, due, out
 ):
     for b in range(first, len(shared.place) - 1, step):
         for at in range(shared.first[b], shared.first[b + 1]):
@@ -209,7 +244,7 @@ def _test(  # type: ignore[no-untyped-def]
             )
             for k in range(len(stem.metamer)):
                 shown = layers[b, 0, layer_of(stem.leaf_height[k], thick)]
-                work[9, k] = shown * stem.leaf_area[k]
+                bench[b, 0, k] = shown * stem.leaf_area[k]
             s = trees.start[row]
             wind = (
                 blow.along_x,
@@ -221,7 +256,7 @@ def _test(  # type: ignore[no-untyped-def]
             out.breaks[row], out.uproots[row] = critical_speeds(
                 stem,
                 arena.tip[s : s + n],
-                work[9:12, : len(stem.metamer)],
+                bench[b],
                 wind,
                 species.drag[sp],
                 species.rupture[sp],
@@ -261,6 +296,7 @@ def find_critical(
     out : Critical
         Filled.
     """
+    bench = np.empty((BINS, 5, int(trees.size.max(initial=0)) + 1))
     layers = np.zeros((BINS, 3, LAYERS))
     in_threads(
         _test,
@@ -268,6 +304,7 @@ def find_critical(
         trees,
         shared,
         scratch,
+        bench,
         layers,
         species,
         turning,
