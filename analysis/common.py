@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,20 +40,31 @@ class Study:
 
 
 def script(
-    document: str | None, study: Callable[[Run], Study], words: Sequence[str] | None
+    document: str | None,
+    study: Callable[..., Study],
+    words: Sequence[str] | None,
+    options: Mapping[str, tuple[float, str]] | None = None,
 ) -> None:
-    """Answer `python analysis/x.py run.h5 --to figure.png`: draw the figure, print the numbers."""
+    """Answer `python analysis/x.py run.h5 --to figure.png`: draw the figure, print the numbers.
+
+    Each of `options` is a number that may be given, `--name 1.5`: its default, and what it is. The
+    study is called with the run and with these by name.
+    """
     lines = (document or "").strip().splitlines()
     parser = argparse.ArgumentParser(description=lines[0])
     parser.add_argument("run", type=Path, help="run file")
     parser.add_argument("--to", type=Path, required=True, help="figure to write: .png, .pdf, .svg")
-    asked = parser.parse_args(words)
+    for name, (default, text) in (options or {}).items():
+        flag = "--" + name.replace("_", "-")
+        parser.add_argument(flag, type=float, default=default, help=f"{text}; default {default:g}")
+    asked = vars(parser.parse_args(words))
+    path, to = asked.pop("run"), asked.pop("to")
     try:
-        with forest.open_run(asked.run) as run:
+        with forest.open_run(path) as run:
             if not len(run.years):
                 raise forest.InputError("holds no years yet", where=str(run.path))
-            made = study(run)
-        save(made.figure, asked.to)
+            made = study(run, **asked)
+        save(made.figure, to)
     except forest.InputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None

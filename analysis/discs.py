@@ -28,7 +28,7 @@ start_year = 1960
 plot = { size_m = [14, 14], boundary = "periodic" }
 environment = { shadow = {}, canopy = {} }
 mechanics = { bending = %s }
-weather = { noise_sd = 0.25 }
+climate = { noise_sd = 0.25 }
 species = { picea_abies = {} }
 planting = { kind = "random", density_ha = 500 }
 output = { sample_trees = { ids = [1, 2, 3, 4, 5, 6, 7, 8, 9] } }

@@ -21,7 +21,6 @@ sys.path.insert(0, str(ROOT))
 
 import forest  # noqa: E402
 from analysis.common import Study, enough, panels, script  # noqa: E402
-from forest.dynamics.weather import income_factor  # noqa: E402
 from forest.record.run import Run  # noqa: E402
 
 SCENARIO = ROOT / "scenarios" / "self_thinning.toml"
@@ -79,12 +78,7 @@ def grow(scenario: forest.Scenario) -> History:
     table.index = pd.RangeIndex(1, len(table) + 1, name="age")
     by_tree = pd.DataFrame(widths, index=table.index)
     living = [int(i) for i in stand.rows.tree_id if i in by_tree.columns]
-    weather = scenario.weather
-    extremes = [(entry.year, entry.factor) for entry in weather.extreme_years]
-    income = [
-        income_factor(int(year), scenario.seed, weather.noise_sd, extremes)
-        for year in table["year"]
-    ]
+    income = [stand.climate.factors(int(year))[0] for year in table["year"]]
     return History(table, by_tree[living].mean(axis=1), pd.Series(income, index=table.index))
 
 
@@ -97,7 +91,7 @@ def with_weather(seed: int) -> History:
     """Grow the pine stand with 15 % noise on yearly income and one year at half income."""
     first = forest.Scenario.load(SCENARIO).start_year
     hard = f"{{ year = {first + HARD_YEAR - 1}, factor = 0.5 }}"
-    return self_thinning(seed, ["weather.noise_sd=0.15", f"weather.extreme_years=[{hard}]"])
+    return self_thinning(seed, ["climate.noise_sd=0.15", f"climate.extreme_years=[{hard}]"])
 
 
 def onset(stand: pd.DataFrame) -> int:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from forest.ensemble.landscape import Landscape, landscape
     from forest.ensemble.sweep import Sweep, open_sweep, sweep
     from forest.errors import InputError
     from forest.record.run import Run, open_run
@@ -23,12 +24,14 @@ __version__ = version("forest-stand")
 
 _HOMES = {
     "InputError": "forest.errors",
+    "Landscape": "forest.ensemble.landscape",
     "Run": "forest.record.run",
     "Scenario": "forest.scenario",
     "Skeleton": "forest.trees.skeleton",
     "Species": "forest.species",
     "Stand": "forest.stand",
     "Sweep": "forest.ensemble.sweep",
+    "landscape": "forest.ensemble.landscape",
     "load_species": "forest.species",
     "open_run": "forest.record.run",
     "open_sweep": "forest.ensemble.sweep",
@@ -38,12 +41,14 @@ _HOMES = {
 
 __all__ = [
     "InputError",
+    "Landscape",
     "Run",
     "Scenario",
     "Skeleton",
     "Species",
     "Stand",
     "Sweep",
+    "landscape",
     "load_species",
     "open_run",
     "open_sweep",

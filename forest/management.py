@@ -96,6 +96,14 @@ def fell(stand: Stand, tree_ids: Sequence[int], cause: str) -> None:
     take_out(stand, rows, "felled", cause)
 
 
+def blow(stand: Stand, speed_m_s: float, direction_deg: float) -> list[int]:
+    """Let a storm blow; see `forest.Stand.blow`."""
+    fallen = stand.storms.blow(stand, speed_m_s, direction_deg)
+    ids: list[int] = stand.rows.tree_id[fallen].tolist()
+    take_out(stand, fallen.tolist(), "windthrown", "wind")
+    return ids
+
+
 def take_out(stand: Stand, rows: Sequence[int], kind: str, cause: str) -> None:
     """Take trees out of the table between two years, with an event each.
 

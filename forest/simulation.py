@@ -64,7 +64,7 @@ def simulate(
     resume : bool
         Go on with an unfinished run of the same scenario, from its last checkpoint; a run without
         one starts over. A finished run is given back, and goes on if `scenario.years` has grown.
-        Acts of years that are not on file may differ.
+        Acts and climate of years that are not on file may differ.
     overwrite : bool
         Replace an existing file.
     progress : bool or Observer
@@ -189,7 +189,7 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
                 "was made by a different scenario",
                 where=f"--resume {out}",
                 expected="the same scenario, seed and settings; only `years` may grow, and acts "
-                "of years that are not on file may differ",
+                "and climate of years that are not on file may differ",
             )
         if years_done > scenario.years:
             raise InputError(
@@ -201,7 +201,7 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
 
 
 def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
-    """Compare two scenarios but for their years, and for acts in years that are not done.
+    """Compare two scenarios but for their years, and for acts and climate in years not done.
 
     Each may choose its sample trees in its own last year.
     """
@@ -210,6 +210,9 @@ def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
         content = scenario.model_dump()
         done = range(scenario.start_year, scenario.start_year + years_done)
         content["acts"] = [act for act in content["acts"] if act["year"] in done]
+        climate = content["climate"]
+        if not climate["repeat"]:  # a series may go on
+            climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]
         last = scenario.start_year + content.pop("years") - 1
         samples = content["output"]["sample_trees"]
         if samples["at_year"] == last:

@@ -13,7 +13,7 @@ from forest import establishment, management
 from forest.dynamics.mortality import Death, starved
 from forest.dynamics.planting import headings
 from forest.dynamics.storms import Storms
-from forest.dynamics.weather import income_factor
+from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
 from forest.growth.allocate import allocate
@@ -66,6 +66,8 @@ class Stand:
         Id of the next tree.
     mechanics : Mechanics or None
         What bends and holds the trees, where the scenario has mechanics.
+    climate : Climate
+        What each year is like, and what the species make of it.
     surroundings : Surroundings
         Light and space.
     storms : Storms
@@ -97,6 +99,7 @@ class Stand:
         self._ring_heights = np.array(scenario.output.ring_heights_m, np.float64)
         self._pipes_before = np.empty(0, np.float32)
         self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
+        self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.storms = Storms(scenario, self.pipe_exponent)
         self.memories: dict[str, Memory] = {
@@ -125,10 +128,11 @@ class Stand:
 
         Raises
         ------
-        ActError
-            If an act cannot be done; then the stand is as it was.
+        InputError
+            If an act cannot be done, or the climate ends before; then the stand is as it was.
         """
         self._clock = time.perf_counter()
+        self.climate.check_known(self.year + 1)
         management.act(self, self._traits.of["branch_pipe"])
         self._lap("act")
         self.steps += 1
@@ -260,16 +264,10 @@ class Stand:
     def growth_year(self) -> Year:
         """Tell growth what it must know of the current step."""
         s = self.scenario
-        factor = income_factor(
-            self.year,
-            s.seed,
-            s.weather.noise_sd,
-            [(e.year, e.factor) for e in s.weather.extreme_years],
-        )
         return Year(
             step=self.steps,
             seed=s.seed,
-            income_factor=np.full(len(self.species), factor * s.site.productivity),
+            income_factor=self.climate.factors(self.year) * s.site.productivity,
             full_light=self._full_light,
             paper=self._paper,
             balance=s.growth.bud_fate == "balance",
@@ -357,7 +355,7 @@ class Stand:
         return management.prune(self, tree_id, metamer, branches, branch_pipe)
 
     def blow(self, speed_m_s: float, direction_deg: float = 0.0) -> list[int]:
-        """Let a storm break and uproot trees at once; see `forest.dynamics.storms.Storms.blow`.
+        """Let a storm break and uproot trees at once; see `forest.dynamics.storms`.
 
         Parameters
         ----------
@@ -371,7 +369,7 @@ class Stand:
         list of int
             Ids of the trees that fell.
         """
-        return self.storms.blow(self, speed_m_s, direction_deg)
+        return management.blow(self, speed_m_s, direction_deg)
 
     # ------------------------------------------------------------------ what it is now
 

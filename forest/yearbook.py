@@ -79,8 +79,8 @@ class YearRecord(NamedTuple):
     year : int
         Calendar year.
     tables : dict of table to columns
-        The year's rows of `/trees`, `/stand`, `/events`, `/rings` and `/carbon`, and of `/stability`
-        and `/storms` where there are any.
+        The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`
+        and, where there are any, of `/stability` and `/storms`.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """
@@ -142,6 +142,7 @@ def record_year(
         "events": _event_rows(stand.year, events),
         "rings": _ring_rows(stand, living, of_living, rings),
         "carbon": _carbon_rows(stand, accounts),
+        "climate": _climate_rows(stand),
     }
     if stand.mechanics is not None:
         tables["stability"] = _stability_rows(stand, living)
@@ -243,6 +244,17 @@ def _carbon_rows(stand: Stand, accounts: NDArray[np.float64]) -> Columns:
         sums = np.bincount(stand.rows.species, weights=accounts[:, column], minlength=k)
         columns[name] = np.append(sums, sums.sum()) * per_hectare
     return columns
+
+
+def _climate_rows(stand: Stand) -> Columns:
+    k = len(stand.species)
+    values = stand.climate.values(stand.year)
+    return {
+        "year": np.full(k, stand.year, np.int32),
+        "species": np.arange(k, dtype=np.int16),
+        **{name: np.full(k, value) for name, value in values.items()},
+        "factor": stand.climate.factors(stand.year),
+    }
 
 
 def choose_samples(stand: Stand, trees: table.Trees, measures: TreeMeasures) -> list[int]:

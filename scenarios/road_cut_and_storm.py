@@ -1,9 +1,9 @@
 """A road cut through a grown stand, and the storm of the year after (Hart & Baker 2003, 6.2).
 
 `python scenarios/road_cut_and_storm.py` grows road_cut_and_storm.toml until the year of its storm,
-fells a strip across the wind, and lets the storm blow; a copy of the stand keeps its trees. It prints
-what winds the trees withstand and which fell, by distance from the new edge and by slenderness,
-and draws both stands and the profile behind the road.
+fells a strip across the wind, and lets the storm blow; a copy of the stand keeps its trees. It
+prints what winds the trees withstand and which fell, by distance from the new edge and by
+slenderness, and draws both stands and the profile behind the road.
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ def by_distance(cut: Storm, uncut: Storm, zone_m: float) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row per zone: trees, median critical wind with and without road, their ratio, and the shares
-        of trees that fell.
+        A row per zone: trees, median critical wind with and without road, their ratio, and the
+        shares of trees that fell.
     """
     last = cut.trees["from_edge_m"].max()
     zones = np.arange(0.0, last + zone_m, zone_m)
@@ -147,7 +147,9 @@ def draw(cut: Storm, uncut: Storm, zones: pd.DataFrame, road_m: float, to: Path)
     profile = axes[2]
     profile.plot(middle, zones["without_road"], "o--", color="0.6", label="without road")
     profile.plot(middle, zones["critical_m_s"], "o-", color="black", label="behind the road")
-    profile.set(xlabel="distance from the edge, m", ylabel="median critical wind, m/s", ylim=(0, None))
+    profile.set(
+        xlabel="distance from the edge, m", ylabel="median critical wind, m/s", ylim=(0, None)
+    )
     profile.legend(loc="lower right", fontsize=8)
     share = profile.twinx()
     width = 0.6 * (middle[1] - middle[0]) if len(middle) > 1 else 1.0

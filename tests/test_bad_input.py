@@ -50,6 +50,15 @@ def refused(folder: Path, *words: str | Path | int, says: str) -> None:
     assert contents(folder) == before
 
 
+def test_climate(folder: Path) -> None:
+    """A bad climate is refused before the run file is touched, also on the way to resume it."""
+    (folder / "years.csv").write_text("year,growth_index\n2001,0.9\n2002,wet\n")
+    says = "climate.file: 'years.csv' line 3, column 'growth_index': 'wet' is not allowed"
+    words = ["--set", "climate.file=years.csv", "--out", folder / "run.h5"]
+    refused(folder, "run", folder / "tiny.toml", *words, "--force", says=says)
+    refused(folder, "run", folder / "tiny.toml", *words, "--resume", says=says)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
@@ -66,7 +75,7 @@ def refused(folder: Path, *words: str | Path | int, says: str) -> None:
         ("output =", "mechanics = true\noutput =", "mechanics: True is not allowed"),
         ("[10, 10]", "[10, 0]", "plot.size_m"),
         ("periodic", "torus", "plot.boundary"),
-        ("0.15", "-0.15", "weather.noise_sd"),
+        ("0.15", "-0.15", "climate.noise_sd"),
         ("pinus_sylvestris", "pinus_silvestris", "did you mean 'pinus_sylvestris'?"),
         ("density_ha = 1000", "density_ha = 1e300", "planting.density_ha"),
         ("checkpoint_every_years = 3", "checkpoint_every_years = 0", "checkpoint_every_years"),

@@ -212,6 +212,20 @@ def test_reader_that_leaves_hears_no_complaint(tmp_path: Path, words: list[str])
     assert (answer.returncode, answer.stderr) == (1, "")
 
 
+def test_the_climate_of_a_run(folder: Path, tmp_path: Path) -> None:
+    table = tmp_path / "climate.csv"
+    sets = ["--set", "climate.generator.drought_index={mean=0, sd=1}"]
+    code, summary, err = forest("check", folder / "tiny.toml", *sets)
+    assert (code, err) == (0, "")
+    assert "drought_index, growth_index drawn" in summary
+    assert forest("run", folder / "tiny.toml", "--out", tmp_path / "x.h5", *sets)[0] == 0
+    assert forest("export", tmp_path / "x.h5", "--table", "climate", "--to", table)[0] == 0
+    first, *rows = table.read_text().splitlines()
+    columns = "temperature_c,precipitation_mm,drought_index,growth_index,factor"
+    assert first == f"year,species,{columns}"
+    assert len(rows) == 16
+
+
 def test_a_stand_that_bends(folder: Path, tmp_path: Path) -> None:
     out, table = tmp_path / "bent.h5", tmp_path / "stability.csv"
     sets = ["--set", "mechanics={wind_m_s=15}", "--years", "4"]

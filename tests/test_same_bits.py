@@ -171,6 +171,27 @@ def test_bent_stand_on_threads_and_restored(tmp_path: Path, mechanics: str) -> N
     assert_same_state(whole, other)
 
 
+def test_a_climate_goes_on_where_it_was(tmp_path: Path) -> None:
+    """Drawn, given and remembered years are the same after a checkpoint."""
+    rows = ", ".join(f"{{year = {2001 + k}, temperature_c = {7 + k % 3}}}" for k in range(YEARS))
+    process = "{mean = 0, sd = 1, autocorrelation = 0.6, extreme_shift_sd = -2}"
+    scenario = tiny(
+        f"climate.series=[{rows}]",
+        f"climate.generator={{extreme_probability = 0.2, drought_index = {process}}}",
+    )
+    whole = Stand(scenario)
+    steps(whole, 4)
+    arrays, meta = whole.state()
+    write_checkpoint(tmp_path / "run.h5", arrays, meta, step=4)
+    after = steps(whole, 4)
+    found = latest_checkpoint(tmp_path / "run.h5")
+    assert found is not None
+    assert_same_years(after, steps(Stand.restore(scenario, *found), 4))
+    factors = [record.tables["climate"]["factor"] for record in after]
+    assert len({tuple(pair) for pair in factors}) == 4
+    assert (factors[0] != factors[0][0]).any()  # each species answers in its own way
+
+
 def test_two_stands_do_not_touch_each_other() -> None:
     one, other = tiny(), tiny("mode=paper", "seed=5", "environment={shadow={}, markers={}}")
     alone = steps(Stand(one), YEARS), steps(Stand(other), YEARS)

@@ -113,6 +113,25 @@ def test_resume_with_another_scenario_is_refused(tmp_path: Path, change: str) ->
     assert checkpoint_paths(out)
 
 
+def test_a_climate_may_go_on_when_a_run_is_resumed(tmp_path: Path) -> None:
+    """New years of a series are no other scenario; other values of years on file are."""
+
+    def series(values: list[float]) -> str:
+        rows = (f"{{year = {2001 + k}, growth_index = {v}}}" for k, v in enumerate(values))
+        return f"climate.series=[{', '.join(rows)}]"
+
+    out, values = tmp_path / "run.h5", [1.0, 0.5, 1.1, 0.9, 1.0, 0.4]
+    samples = "output.sample_trees={}"
+    simulate(tiny("years=4", series(values[:4]), samples), out).close()
+    with pytest.raises(InputError, match="different scenario"):
+        simulate(tiny("years=6", series([0.9, *values[1:]]), samples), out, resume=True)
+    longer = tiny("years=6", series(values), samples)
+    with simulate(longer, out, resume=True) as run, simulate(longer, tmp_path / "b.h5") as whole:
+        assert_same_runs(run, whole)
+        assert run.climate["growth_index"].tolist() == [v for v in values for _ in range(2)]
+        assert run.scenario == longer
+
+
 def test_resume_without_its_checkpoints_is_refused(tmp_path: Path) -> None:
     """Starting over would lose years that cannot be had back without growing them again."""
     out = tmp_path / "run.h5"

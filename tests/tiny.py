@@ -24,7 +24,7 @@ title = "ten young trees"
 years = {YEARS}
 start_year = 2001
 plot = {{ size_m = [10, 10], boundary = "periodic" }}
-weather = {{ noise_sd = 0.15 }}
+climate = {{ noise_sd = 0.15 }}
 environment = {{ shadow = {{}}, canopy = {{}} }}
 species = {{ pinus_sylvestris = {{}}, fagus_sylvatica = {{}} }}
 planting = {{ kind = "random", density_ha = 1000 }}

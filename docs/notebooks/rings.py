@@ -16,7 +16,7 @@ years = 80
 start_year = 1940
 seed = 5
 plot = { size_m = [15, 15], boundary = "periodic" }
-weather = { noise_sd = 0.2 }
+climate = { noise_sd = 0.2 }
 environment = { shadow = {}, canopy = {} }
 species = { pinus_sylvestris = { share = 3 }, fagus_sylvatica = { share = 1 } }
 planting = { kind = "random", density_ha = 4000 }
@@ -41,16 +41,10 @@ cores.about[["tree_id", "species", "azimuth_deg", "first_year", "pith_offset", "
 # cores agree with each other, and does the chronology follow the weather that the run was given?
 
 # %%
-import pandas as pd
-
-from forest.dynamics.weather import income_factor
-
 chronology = (cores.widths / cores.widths.rolling(11, center=True, min_periods=6).mean()).mean(
     axis=1
 )
-noise = scenario.weather.noise_sd
-weather = [income_factor(int(year), scenario.seed, noise, []) for year in chronology.index]
-weather = pd.Series(weather, chronology.index)
+weather = run.climate.drop_duplicates("year").set_index("year").factor.loc[chronology.index]
 print(f"interseries correlation {dendro.interseries_correlation(cores.widths).mean():.2f}")
 print(f"chronology and weather  {chronology.corr(weather):.2f}")
 

@@ -16,7 +16,7 @@ from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
 from forest.cli.measuring import bucking, measure
-from forest.cli.reading import info, picture, stability, table
+from forest.cli.reading import info, landscape, picture, stability, table
 from forest.cli.ringing import rings
 from forest.cli.shared import Stopped
 
@@ -41,6 +41,7 @@ app = typer.Typer(
 for _command in (
     run,
     sweep,
+    landscape,
     check,
     table,
     stability,

@@ -26,7 +26,7 @@ def measure(
 ) -> None:
     """Measure all trees of a year: diameters, stem, crown, biomass, competition.
 
-    Without --to a short table by species is printed.
+    Without --to a short table by species is printed, and how much of the plot lies in gaps.
 
     Examples:
 
@@ -46,10 +46,12 @@ def measure(
             return
         from rich.console import Console
 
-        from forest.view.measured_table import species_table
+        from forest.measure.gaps import gaps
+        from forest.view.measured_table import gaps_line, species_table
 
-        hectares = plot_of(run.scenario).hectares
-        Console().print(species_table(measure_run(run, at), hectares))
+        plot, trees = plot_of(run.scenario), measure_run(run, at)
+        Console().print(species_table(trees, plot.hectares))
+        typer.echo(gaps_line(gaps(trees, plot)))
 
 
 def bucking(

@@ -81,6 +81,58 @@ def stability(
         typer.echo(f"{to}: {rows} classes")
 
 
+def landscape(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a sweep.")],
+    year: Annotated[int | None, typer.Option(help="Default: the last year of any plot.")] = None,
+    least_basal_area: Annotated[
+        float,
+        typer.Option(metavar="M2HA", help="Below this basal area no species dominates a plot."),
+    ] = 1.0,
+    to: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="The plots as a mosaic, and over time.")
+    ] = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option("--csv", metavar="FILE", help="A row per plot and year: .csv or .parquet."),
+    ] = None,
+    totals: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A row per year of the whole: .csv or .parquet."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
+) -> None:
+    """Read the runs of a sweep as the plots of a landscape, and print a year of it.
+
+    Says which share of the area each dominant species and each development stage holds.
+
+    Examples:
+
+        forest landscape spruce
+
+        forest landscape spruce --year 2060 --to landscape.png --csv plots.csv --totals years.csv
+    """
+    from rich.console import Console
+
+    from forest.ensemble.landscape import landscape as read_landscape
+    from forest.record.export import write_frame
+    from forest.view.landscape_picture import draw_landscape
+    from forest.view.landscape_table import landscape_table
+
+    if to is not None:
+        check_picture(to, force)
+    found = read_landscape(folder, least_basal_area_m2ha=least_basal_area)
+    Console().print(landscape_table(found, year))
+    if csv is not None:
+        rows = write_frame(lambda: found.plots, csv, overwrite=force)
+        typer.echo(f"{csv}: {rows:,} plots and years")
+    if totals is not None:
+        rows = write_frame(lambda: found.totals, totals, overwrite=force)
+        typer.echo(f"{totals}: {rows:,} years")
+    if to is not None:
+        draw_landscape(found, to, year=year)
+        typer.echo(f"{to}: {found.plots['run'].nunique()} plots")
+
+
 def picture(
     run_file: RunFile,
     to: Annotated[

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest import management
 from forest.dynamics.mortality import Death
 from forest.growth.dealing import Workbench, deal
 from forest.mechanics.fetch import Exposure, Ways, expose, heading, lay_ways
@@ -106,13 +105,13 @@ class Storms:
 
     # ------------------------------------------------------------------ between years
 
-    def blow(self, stand: Stand, speed_m_s: float, direction_deg: float) -> list[int]:
-        """Let a storm blow at once; events and rows of `/storms` come in the next year's record.
+    def blow(self, stand: Stand, speed_m_s: float, direction_deg: float) -> NDArray[np.int64]:
+        """Let a storm blow between two years; its rows of `/storms` come in the next record.
 
         Returns
         -------
-        list of int
-            Ids of the trees that fell.
+        int64 (k,)
+            Rows of the trees that fall, still in the table.
 
         Raises
         ------
@@ -120,12 +119,8 @@ class Storms:
             If there is no such storm.
         """
         storm = Storm.of("Stand.blow", stand.year, speed_m_s, direction_deg)
-        n = len(stand.rows.tree_id)
-        none = np.zeros(n, np.bool_)
-        fell = self._throw(stand, stand.measure(), storm, ~none, none)
-        ids: list[int] = stand.rows.tree_id[fell].tolist()
-        management.take_out(stand, fell.tolist(), "windthrown", "wind")
-        return ids
+        none = np.zeros(len(stand.rows.tree_id), np.bool_)
+        return self._throw(stand, stand.measure(), storm, ~none, none)
 
     def critical(self, stand: Stand, direction_deg: float) -> Columns:
         """Find the storms of a direction that the trees do not withstand; none falls."""

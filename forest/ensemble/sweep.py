@@ -27,6 +27,8 @@ from forest.errors import InputError, OutputError, nearest
 if TYPE_CHECKING:
     import pandas as pd
 
+    from forest.ensemble.landscape import Landscape
+
 _LOW, _HIGH = 0.05, 0.95
 _YEARS_TO_WARM = 3
 
@@ -114,6 +116,24 @@ class Sweep:
         means["low"] = groups.quantile(_LOW)
         means["high"] = groups.quantile(_HIGH)
         return means.reset_index()
+
+    def landscape(self, *, least_basal_area_m2ha: float | None = None) -> Landscape:
+        """Read the finished runs as the plots of a landscape; see `forest.ensemble.landscape`.
+
+        Parameters
+        ----------
+        least_basal_area_m2ha : float, optional
+            Basal area below which a plot has no dominant species; default: 1.
+
+        Raises
+        ------
+        InputError
+            If no finished run holds a stand table, or one cannot be read.
+        """
+        from forest.ensemble.landscape import LEAST_BASAL_AREA_M2HA, landscape_of
+
+        least = LEAST_BASAL_AREA_M2HA if least_basal_area_m2ha is None else least_basal_area_m2ha
+        return landscape_of(self, least_basal_area_m2ha=least)
 
 
 def open_sweep(folder: str | Path) -> Sweep:

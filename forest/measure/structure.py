@@ -168,6 +168,34 @@ def _lay_discs(
                     covered[layer[t], row, column] = True
 
 
+def crown_raster(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    radius: NDArray[np.float64],
+    species: NDArray[np.int64],
+    n_species: int,
+    size_m: tuple[float, float],
+    periodic: bool,
+) -> NDArray[np.bool_]:
+    """Lay crowns as discs on a raster of about 0.5 m: (n_species, ny, nx), rows along y.
+
+    A cell counts as covered if its centre lies under a crown.
+    """
+    nx, ny = (max(round(side / COVER_CELL_M), 1) for side in size_m)
+    covered = np.zeros((n_species, ny, nx), np.bool_)
+    _lay_discs(
+        np.asarray(x, np.float64),
+        np.asarray(y, np.float64),
+        np.asarray(radius, np.float64),
+        np.asarray(species, np.int64),
+        float(size_m[0]),
+        float(size_m[1]),
+        bool(periodic),
+        covered,
+    )
+    return covered
+
+
 def crown_cover(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -186,17 +214,6 @@ def crown_cover(
     float64 (n_species + 1,)
         The last entry is for all species.
     """
-    nx, ny = (max(round(side / COVER_CELL_M), 1) for side in size_m)
-    covered = np.zeros((n_species, ny, nx), np.bool_)
-    _lay_discs(
-        np.asarray(x, np.float64),
-        np.asarray(y, np.float64),
-        np.asarray(radius, np.float64),
-        np.asarray(species, np.int64),
-        float(size_m[0]),
-        float(size_m[1]),
-        bool(periodic),
-        covered,
-    )
+    covered = crown_raster(x, y, radius, species, n_species, size_m, periodic)
     each = covered.mean(axis=(1, 2))
     return np.append(each, covered.any(axis=0).mean())

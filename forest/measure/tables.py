@@ -27,6 +27,7 @@ from forest.measure.competition import (
 )
 from forest.measure.crowns import Crowns, crown_of, crowns_of
 from forest.measure.density import curtis_rd, summation_sdi
+from forest.measure.gaps import gap_share
 from forest.measure.stand import Plot
 from forest.measure.stem import Stems, stems_of, stems_of_skeletons
 from forest.measure.structure import Neighbours, mingling
@@ -173,8 +174,10 @@ def stand_indices(trees: pd.DataFrame, plot: Plot) -> dict[str, float]:
     -------
     dict of float
         `summation_sdi`, `curtis_rd`, `species_profile` (Pretzsch's A), `relative_species_profile`,
-        `height_diversity` (Shannon of basal area in layers of 2 m), and the means of the trees'
-        `hegyi`, `bal_m2ha` and `size_differentiation`; NaN where there is no tree to tell.
+        `height_diversity` (Shannon of basal area in layers of 2 m), `gap_share` (of the plot, not
+        under a crown of more than a third of the top height), and the means of the trees' `hegyi`,
+        `bal_m2ha` and `size_differentiation`; NaN where there is no tree to tell,
+        but for `summation_sdi` (0) and `gap_share` (1).
     """
     dbh = trees["dbh_cm"].to_numpy(np.float64)
     ground = trees["basal_area_m2"].to_numpy(np.float64)
@@ -186,6 +189,7 @@ def stand_indices(trees: pd.DataFrame, plot: Plot) -> dict[str, float]:
         "species_profile": species_profile(height, trees["species"]),
         "relative_species_profile": relative_species_profile(height, trees["species"]),
         "height_diversity": height_diversity(height, ground),
+        "gap_share": gap_share(trees, plot),
     }
     for name in ("hegyi", "bal_m2ha", "size_differentiation"):
         indices[name] = float(trees[name].mean())

@@ -277,9 +277,7 @@ def _follow(first, step, height, standing, ways, scratch, out):  # type: ignore[
             if not standing[row]:
                 continue
             scratch[b] = 0.0
-            _gather(
-                row, height, standing, out.spacing, ways, scratch[b, 0], scratch[b, 1]
-            )
+            _gather(row, height, standing, out.spacing, ways, scratch[b, 0], scratch[b, 1])
             edge = _edge_of(canopy, scratch[b, 0], scratch[b, 1])
             fall = ATTENUATION * (1.0 - edge)
             load = gust_load(out.spacing[row] / canopy, edge) / lone
@@ -288,9 +286,7 @@ def _follow(first, step, height, standing, ways, scratch, out):  # type: ignore[
             out.share[row] = np.sqrt(load) * np.exp(fall * (1.0 - DRAG_HEIGHT))
 
 
-def expose(
-    height: NDArray[np.float64], standing: NDArray[np.bool_], ways: Ways
-) -> Exposure:
+def expose(height: NDArray[np.float64], standing: NDArray[np.bool_], ways: Ways) -> Exposure:
     """Follow a wind to each standing tree.
 
     Parameters

@@ -1,8 +1,9 @@
 """The winds that break a stem or turn its root plate over.
 
 A storm's gusts load the crown with the mean wind's drag times `GUST`. The stem breaks where the
-bending stress in its lower third reaches the modulus of rupture; the tree is uprooted when the moment at the ground
-reaches what tree pulling found, a multiple of the fresh mass of the stem (Gardiner et al. 2000).
+bending stress in its lower third reaches the modulus of rupture; the tree is uprooted when the
+moment at the ground reaches what tree pulling found, a multiple of the fresh mass of the stem
+(Gardiner et al. 2000).
 """
 
 from __future__ import annotations
@@ -223,9 +224,8 @@ def critical_speeds(stem, tip, scratch, wind, drag, rupture, turning):  # type: 
 
 
 @driver
-def _test(  # type: ignore[no-untyped-def]
-    first, step, arena, trees, shared, scratch, bench, layers, species, turning, rigidity, blow, due, out
-):
+def _test(first, step, arena, trees, shared, spaces, species, turning, rigidity, blow, due, out):  # type: ignore[no-untyped-def]
+    scratch, bench, layers = spaces
     for b in range(first, len(shared.place) - 1, step):
         for at in range(shared.first[b], shared.first[b + 1]):
             row = shared.rows[at]
@@ -303,9 +303,7 @@ def find_critical(
         metamers,
         trees,
         shared,
-        scratch,
-        bench,
-        layers,
+        (scratch, bench, layers),
         species,
         turning,
         rigidity,
@@ -313,4 +311,3 @@ def find_critical(
         due,
         out,
     )
-

@@ -119,6 +119,11 @@ class Run:
         return self._frame("stability")
 
     @property
+    def climate(self) -> pd.DataFrame:
+        """A row per year and species: the climate, and the species' factor on income."""
+        return self._frame("climate")
+
+    @property
     def storms(self) -> pd.DataFrame:
         """A row per tree and storm: the winds that it does not stand, and whether it stood."""
         return self._frame("storms")

@@ -229,6 +229,19 @@ STABILITY = Table(
     ),
 )
 
+CLIMATE = Table(
+    "a year and species: the year's climate, and what the species makes of it",
+    (
+        _YEAR,
+        _SPECIES,
+        _number("temperature_c", "°C", "mean annual temperature", dtype="float64"),
+        _number("precipitation_mm", "mm", "annual precipitation", dtype="float64"),
+        _number("drought_index", "", "drought index; below 0 dry", dtype="float64"),
+        Column("growth_index", "float64", "", "factor on the income of all species"),
+        Column("factor", "float64", "", "factor on the species' income, growth index included"),
+    ),
+)
+
 STORMS = Table(
     "a tree and storm",
     (
@@ -273,6 +286,7 @@ TABLES: dict[str, Table] = {
     "rings": RINGS,
     "carbon": CARBON,
     "stability": STABILITY,
+    "climate": CLIMATE,
     "storms": STORMS,
 }
 

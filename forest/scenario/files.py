@@ -1,4 +1,4 @@
-"""The files that a scenario names: stem maps, marker clouds, meshes."""
+"""The files that a scenario names: stem maps, climates, marker clouds, meshes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import csv
 import hashlib
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from forest.errors import InputError
+from forest.errors import InputError, nearest
 from forest.species.schema import Refusal
 from forest.species.text import read_bytes, read_text
 
@@ -71,15 +72,22 @@ def _check_header(file: str, line: int, header: list[str], columns: tuple[str, .
         raise Refusal(f"{file!r} line {line} names a column twice")
 
 
-def _number(file: str, line: int, row: dict[str, str], column: str) -> float:
+def _number(
+    file: str,
+    line: int,
+    row: dict[str, str],
+    column: str,
+    limits: tuple[float, float] = (-_LIMIT_M, _LIMIT_M),
+) -> float:
     try:
         value = float(row[column])
     except ValueError:
         value = math.nan
-    if not abs(value) <= _LIMIT_M:
+    low, high = limits
+    if not low <= value <= high:
         raise Refusal(
             f"{file!r} line {line}, column '{column}': {row[column][:40]!r} is not allowed",
-            expected=f"a number, {-_LIMIT_M:g} to {_LIMIT_M:g}",
+            expected=f"a number, {low:g} to {high:g}",
         )
     return value
 
@@ -95,6 +103,44 @@ def read_stem_map(
     if not trees:
         raise Refusal(f"{file!r} holds no tree", expected="at least one row")
     return trees
+
+
+def read_climate(
+    file: str, variables: Mapping[str, tuple[float, float]], context: Any
+) -> list[tuple[int, dict[str, float]]]:
+    """Read the years of a climate, in the order of years: each year and its variables.
+
+    `variables` are the columns that may be there, each with its least and greatest value.
+    """
+    years: dict[int, tuple[int, dict[str, float]]] = {}
+    for line, row in _rows(file, context, ("year",)):
+        names = [name for name in row if name != "year"]
+        unknown = [name for name in names if name not in variables]
+        if unknown or not names:
+            what = f"has an unknown column '{unknown[0][:40]}'" if unknown else "has only years"
+            hint = nearest(unknown[0], variables) if unknown else "one of " + ", ".join(variables)
+            raise Refusal(f"{file!r} {what}, {hint}")
+        number = _number(file, line, row, "year")
+        year = int(number)
+        if year != number:
+            raise Refusal(
+                f"{file!r} line {line}, column 'year': {row['year'][:40]!r} is not allowed",
+                expected="a whole number",
+            )
+        if year in years:
+            raise Refusal(f"{file!r} line {line}: {year} stands in line {years[year][0]} already")
+        values = {name: _number(file, line, row, name, variables[name]) for name in names}
+        years[year] = line, values
+    if not years:
+        raise Refusal(f"{file!r} holds no year", expected="at least one row")
+    ordered = sorted(years)
+    for before, after in pairwise(ordered):
+        if after != before + 1:
+            raise Refusal(
+                f"{file!r} line {years[after][0]}: {after} does not follow {before}",
+                expected="every year between the first and the last",
+            )
+    return [(year, years[year][1]) for year in ordered]
 
 
 def read_cloud(file: str, context: Any) -> list[tuple[float, float, float]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from forest.errors import nearest
 from forest.scenario import placing
 from forest.scenario.acts import check_acts
+from forest.scenario.climate import check_covered
 from forest.scenario.complete import check_spots
 from forest.scenario.model import Explicit, Random, Regular
 from forest.scenario.wind import check_wind
@@ -27,6 +28,7 @@ def check_fit(scenario: Scenario) -> None:
     _picture_fits(scenario)
     _grid_fits(scenario)
     _trees_fit(scenario)
+    check_covered(scenario.climate, scenario.calendar)
     check_wind(scenario)
     check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
 

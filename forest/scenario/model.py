@@ -18,7 +18,9 @@ _Extent = Annotated[float, Field(gt=0, le=1e5)]
 _DiscHeight = Annotated[float, Field(gt=0, le=150)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
-_TableName = Literal["trees", "stand", "events", "rings", "carbon", "stability", "storms"]
+_TableName = Literal[
+    "trees", "stand", "events", "rings", "carbon", "stability", "storms", "climate"
+]
 
 
 class Plot(Table):
@@ -37,33 +39,6 @@ class Site(Table):
     latitude_deg: float = quantity(
         50.0, "geographic latitude; sets the sun's path", unit="degree", ge=-75, le=75
     )
-
-
-class ExtremeYear(Table):
-    """One year whose weather is given."""
-
-    year: int = quantity(..., "calendar year", unit="year", ge=-100000, le=100000)
-    factor: float = quantity(..., "factor on that year's income", ge=0, le=2)
-
-
-class Weather(Table):
-    """How years differ."""
-
-    noise_sd: float = quantity(0.0, "standard deviation of the yearly factor on income", ge=0, le=1)
-    extreme_years: tuple[ExtremeYear, ...] = quantity(
-        (), "years whose factor is multiplied in", unit="", max_length=10000
-    )
-
-    @model_validator(mode="after")
-    def _each_year_once(self) -> Weather:
-        seen: set[int] = set()
-        for i, entry in enumerate(self.extreme_years):
-            if entry.year in seen:
-                raise Refusal(
-                    f"the year {entry.year} is given twice", key=f"extreme_years[{i}].year"
-                )
-            seen.add(entry.year)
-        return self
 
 
 class Growth(Table):
@@ -385,11 +360,11 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        ("trees", "stand", "events", "rings", "carbon", "stability", "storms"),
+        ("trees", "stand", "events", "rings", "carbon", "stability", "storms", "climate"),
         "tables to write; stability only has rows where there is a table mechanics, storms where "
         "the wind blew",
         unit="",
-        max_length=7,
+        max_length=8,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(

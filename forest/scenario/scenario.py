@@ -15,6 +15,7 @@ from pydantic import PrivateAttr, ValidationError, ValidationInfo, field_validat
 
 from forest.scenario import placing
 from forest.scenario.acts import Act
+from forest.scenario.climate import Climate, embed_file
 from forest.scenario.complete import complete, embed_stem_map
 from forest.scenario.fitting import check_fit
 from forest.scenario.model import (
@@ -31,7 +32,6 @@ from forest.scenario.model import (
     Site,
     SpeciesUse,
     StemMap,
-    Weather,
 )
 from forest.scenario.wind import Wind
 from forest.species.model import Species
@@ -47,8 +47,8 @@ class Scenario(Table):
         Scenario(years=10, plot={"size_m": [10, 10]}, environment={"shadow": {}},
                  species={"pinus_sylvestris": {}}, planting={"kind": "random", "density_ha": 4000})
 
-    Files that it names (stem maps, marker clouds) are read at once, and species are completed
-    from the shipped ones, so a scenario and its `to_toml` stand for themselves.
+    Files that it names (stem maps, climates, marker clouds) are read at once, and species are
+    completed from the shipped ones, so a scenario and its `to_toml` stand for themselves.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class Scenario(Table):
     )
     plot: Plot
     site: Site = Site()
-    weather: Weather = Weather()
+    climate: Climate = Climate()
     growth: Growth = Growth()
     mechanics: Mechanics | None = None
     wind: Wind | None = None
@@ -137,6 +137,13 @@ class Scenario(Table):
 
     # --- checks and completion -------------------------------------------------------------
 
+    @model_validator(mode="before")
+    @classmethod
+    def _climate_was_weather(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and "weather" in data:
+            raise Refusal("unknown key 'weather', did you mean 'climate'?")
+        return data
+
     @field_validator("species", mode="before")
     @classmethod
     def _complete_species(cls, species: Any) -> Any:
@@ -144,6 +151,11 @@ class Scenario(Table):
         if not isinstance(species, dict):
             return species
         return {name: complete(name, given) for name, given in species.items()}
+
+    @field_validator("climate")
+    @classmethod
+    def _read_climate(cls, climate: Climate, info: ValidationInfo) -> Climate:
+        return embed_file(climate, info)
 
     @field_validator("planting")
     @classmethod

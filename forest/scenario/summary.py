@@ -38,6 +38,7 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("trees", f"{trees} ({len(kind) / (width * depth) * 1e4:,.0f} per ha)"),
         ("years", f"{scenario.years} ({scenario.start_year} to {last})"),
         ("mode", scenario.mode),
+        ("climate", _climate(scenario)),
         ("environment", " + ".join(parts)),
         ("bud fate", scenario.growth.bud_fate),
         ("mechanics", _mechanics(scenario)),
@@ -48,6 +49,20 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("tables", ", ".join(scenario.output.tables) or "none"),
         ("sha256", scenario.digest()),
     ]
+
+
+def _climate(scenario: Scenario) -> str:
+    climate = scenario.climate
+    told = []
+    if climate.series:
+        span = f"{climate.series[0].year} to {climate.series[-1].year}"
+        again = ", repeated" if climate.repeat else ""
+        told.append(f"{', '.join(climate.given)} of {span}{again}")
+    if climate.drawn:
+        told.append(f"{', '.join(climate.drawn)} drawn")
+    if climate.extreme_years:
+        told.append(f"{len(climate.extreme_years)} years by hand")
+    return "; ".join(told) or "mean years"
 
 
 def _mechanics(scenario: Scenario) -> str:

@@ -44,7 +44,11 @@ class YearlyStorms(Table):
     """The strongest storm of every year, drawn at random."""
 
     mode_m_s: float = quantity(
-        ..., "most frequent speed of a year's strongest wind (Gumbel's mode)", unit="m/s", gt=0, le=100
+        ...,
+        "most frequent speed of a year's strongest wind (Gumbel's mode)",
+        unit="m/s",
+        gt=0,
+        le=100,
     )
     dispersion_m_s: float = quantity(
         ..., "how far it varies from year to year (Gumbel's scale)", unit="m/s", gt=0, le=50
@@ -63,9 +67,7 @@ class YearlyStorms(Table):
         ge=0,
         le=500,
     )
-    from_m_s: float = quantity(
-        10.0, "weaker storms are passed over", unit="m/s", ge=0, le=100
-    )
+    from_m_s: float = quantity(10.0, "weaker storms are passed over", unit="m/s", ge=0, le=100)
 
 
 class Wind(Table):

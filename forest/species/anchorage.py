@@ -10,8 +10,8 @@ class Anchorage(Table):
 
     turning_moment_nm_kg: float = quantity(
         130.0,
-        "bending moment at the ground that turns the root plate over, per fresh mass of the stem, on "
-        "well drained mineral soil (slope of tree-pulling tests through the origin)",
+        "bending moment at the ground that turns the root plate over, per fresh mass of the "
+        "stem, on well drained mineral soil (slope of tree-pulling tests through the origin)",
         unit="N m/kg",
         gt=0,
         le=2000,

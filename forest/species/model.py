@@ -5,29 +5,16 @@ Symbols in the descriptions are those of Palubicki et al. 2009 unless a source i
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from forest.errors import nearest
 from forest.species.anchorage import Anchorage
+from forest.species.curves import Curve, FactorCurve
+from forest.species.response import Response
 from forest.species.schema import Refusal, Table, quantity
 
-
-def _ascending(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    for (before, _), (after, _) in pairwise(points):
-        if after <= before:
-            raise Refusal("the x of a curve does not rise", expected="points [x, y], x ascending")
-    return points
-
-
-_Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
-#: A piecewise linear curve: points (x, y), x ascending; constant beyond its ends; empty = off.
-Curve = Annotated[tuple[tuple[_Coordinate, _Coordinate], ...], AfterValidator(_ascending)]
-_Factor = Annotated[float, Field(ge=0.05, le=20)]
-#: A curve of factors that must not vanish.
-FactorCurve = Annotated[tuple[tuple[_Coordinate, _Factor], ...], AfterValidator(_ascending)]
 Direction = tuple[
     Annotated[float, Field(ge=-1, le=1)],
     Annotated[float, Field(ge=-1, le=1)],
@@ -375,6 +362,7 @@ SECTIONS: dict[str, type[Table]] = {
     "balance": Balance,
     "mechanics": Mechanics,
     "mensuration": Mensuration,
+    "response": Response,
     "anchorage": Anchorage,
 }
 
@@ -398,6 +386,7 @@ class Species(Table):
     balance: Balance = Balance()
     mechanics: Mechanics = Mechanics()
     mensuration: Mensuration = Mensuration()
+    response: Response = Response()
     anchorage: Anchorage = Anchorage()
     sources: dict[str, dict[str, str]] = Field(
         default={},

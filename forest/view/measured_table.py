@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.table import Table
 
+    from forest.measure.gaps import Gaps
+
 
 def species_table(trees: pd.DataFrame, hectares: float) -> Table:
     """Give a table of measured trees: a row per species, and one for all of several.
@@ -51,6 +53,20 @@ def species_table(trees: pd.DataFrame, hectares: float) -> Table:
             f"{rows['carbon_kg'].sum() / hectares / 1000:.1f}",
         )
     return table
+
+
+def gaps_line(gaps: Gaps) -> str:
+    """Say in a line how much of the plot lies in canopy gaps, and in what sizes."""
+    area = gaps.area_m2
+    if not len(area):
+        return f"no gap between the crowns of trees above {gaps.taller_than_m:.1f} m"
+    if not gaps.share() < 1.0:
+        return "the whole plot is a gap"
+    number = f"{len(area)} gaps, the largest" if len(area) > 1 else "1 gap"
+    return (
+        f"gaps between the crowns of trees above {gaps.taller_than_m:.1f} m: "
+        f"{100.0 * gaps.share():.0f} % of the plot; {number} {area.max():.1f} m²"
+    )
 
 
 def assortment_table(sums: pd.DataFrame) -> Table:

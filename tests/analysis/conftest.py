@@ -17,7 +17,7 @@ years = 40
 start_year = 1960
 seed = 3
 plot = { size_m = [10, 10], boundary = "periodic" }
-weather = { noise_sd = 0.2 }
+climate = { noise_sd = 0.2 }
 environment = { shadow = {}, canopy = {} }
 species = { pinus_sylvestris = { share = 3 }, fagus_sylvatica = { share = 1 } }
 planting = { kind = "random", density_ha = 6000 }

@@ -10,6 +10,7 @@ from scipy import stats
 from analysis import (
     diameter_distribution,
     growth_dominance,
+    old_growth,
     pressler,
     ring_series,
     social_classes,
@@ -17,8 +18,10 @@ from analysis import (
     succession,
 )
 from forest.measure.bucking import Product
+from forest.measure.diameter_target import reverse_j
+from forest.measure.gaps import gap_share
 from forest.measure.stem import stems_of_skeletons
-from forest.measure.tables import buck_run, sample_skeletons
+from forest.measure.tables import buck_run, plot_of, sample_skeletons
 from forest.measure.taper import RINGS_READ, disc_diameters, taper_stems
 from forest.record.run import Run
 
@@ -240,3 +243,25 @@ def test_all_trees_of_a_run_are_bucked(dense_run: Run):
     by_tree = logs.groupby("tree_id")["volume_m3"].sum()
     assert (by_tree < trees.loc[by_tree.index, "stem_volume_m3"]).all()
     assert set(trees.index[trees["merchantable_volume_m3"] > 0.02]) <= set(by_tree.index)
+
+
+def test_old_growth_of_the_last_year(dense_run: Run):
+    target = reverse_j(1.3, 25.0, 30.0)
+    table = old_growth.table(dense_run, target, 12.0)
+    assert table["year"].tolist() == list(range(1964, LAST + 1, 5))
+    trees = dense_run.read("trees", years=(LAST, LAST))
+    last = table.iloc[-1]
+    assert last["overlap"] == target.agreement(trees["dbh_cm"], 0.01).overlap
+    assert last["gap_share"] == gap_share(trees, plot_of(dense_run.scenario), least_m2=5.0)
+    assert last["big_ha"] == 100 * (trees["dbh_cm"] >= 12.0).sum() > 0
+    assert table["overlap_g"].iloc[-1] > table["overlap_g"].iloc[0]
+    events = dense_run.events
+    died = events[events["kind"] == "died"]
+    left = np.exp(-old_growth.DECAY_PER_YEAR * (LAST - died["year"]))
+    assert last["dead_wood_m3ha"] == pytest.approx(100 * (died["volume_m3"] * left).sum(), rel=1e-6)
+    assert last["dead_wood_m3ha"] > 0
+
+
+def test_effective_layers_by_hand():
+    assert old_growth.effective_layers([10.0, 9.5]) == pytest.approx(1.0)
+    assert old_growth.effective_layers([10.0, 7.0, 2.0]) == pytest.approx(3.0)

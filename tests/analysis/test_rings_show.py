@@ -64,7 +64,7 @@ def test_suppressed_trees_grow_wide_rings_once_their_neighbours_are_felled():
 
 @pytest.mark.stand
 def test_pressler_holds_over_a_century(tmp_path):
-    scenario = Scenario.load(SCENARIO).with_overrides(["weather.noise_sd=0.2"])
+    scenario = Scenario.load(SCENARIO).with_overrides(["climate.noise_sd=0.2"])
     with simulate(scenario, tmp_path / "run.h5") as run:
         for year in (2049, 2074, 2099):
             (row,) = pressler.table(pressler.profiles(run, year)).to_dict("records")

@@ -23,6 +23,8 @@ SCRIPTS = {
     "social_classes": "slenderness",
     "growth_dominance": "gini_volume",
     "self_thinning": "slope",
+    "climate_rings": "driest_year",
+    "old_growth": "gap_share",
 }
 
 
@@ -50,12 +52,14 @@ def test_a_script_starts_as_a_file(dense_run: Run, tmp_path: Path) -> None:
     ("name", "says"),
     [
         ("ring_series", "has no rings at 1.3 m"),
+        ("climate_rings", "has no rings at 1.3 m"),
         ("pressler", "has no tree with 3 discs below its crown"),
         ("diameter_distribution", "has no year with 15 trees that have a dbh"),
         ("social_classes", "has no tree of 1.3 m"),
         ("succession", "has no tree of 1.3 m"),
         ("self_thinning", "has no tree of 1.3 m"),
         ("stem_analysis", "has no tree that reaches 1.3 m"),
+        ("old_growth", "has no tree of 5 cm"),
         ("growth_dominance", "has no five years that 5 trees lived through"),
     ],
 )
@@ -68,6 +72,21 @@ def test_a_stand_of_seedlings_is_refused(
     assert end.value.code == 2
     assert capsys.readouterr().err == f"error: {seedlings}: {says}; expected an older stand\n"
     assert not (seedlings.parent / "x.png").exists()
+
+
+def test_a_target_may_be_given(
+    dense_run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main = importlib.import_module("analysis.old_growth").main
+    words = [str(dense_run.path), "--to", str(tmp_path / "figure.png")]
+    main([*words, "--largest", "30", "--q", "1.2", "--basal-area", "20", "--big", "15"])
+    near = capsys.readouterr().out.splitlines()
+    main(words)
+    assert near[0] == capsys.readouterr().out.splitlines()[0]
+    with pytest.raises(SystemExit) as end:
+        main([*words, "--largest", "33"])
+    assert end.value.code == 2
+    assert "do not fill 5 to 33 cm" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ years = 60
 start_year = 1950
 seed = 5
 plot = { size_m = [10, 10], boundary = "periodic" }
-weather = { noise_sd = 0.3 }
+climate = { noise_sd = 0.3 }
 environment = { shadow = {}, canopy = {} }
 species = { pinus_sylvestris = {}, fagus_sylvatica = {} }
 planting = { kind = "random", density_ha = 1900 }

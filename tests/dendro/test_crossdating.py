@@ -13,7 +13,6 @@ import pytest
 
 from forest.dendro import campaign, interseries_correlation, read_rwl, ring_series, write_rwl
 from forest.dendro.crossdating import LEAST_YEARS, relative_changes
-from forest.dynamics.weather import income_factor
 from forest.record.run import Run
 
 
@@ -125,13 +124,8 @@ def test_cross_dating_by_dplpy_finds_the_right_years(field):
 def test_the_chronology_follows_the_weather(field, noisy_run):
     _, read = field
     chronology = dplpy.chron(dplpy.detrend(read, fit="Spline", spline_period=20), plot=False)
-    scenario = noisy_run.scenario
-    weather = pd.Series(
-        {
-            year: income_factor(year, scenario.seed, scenario.weather.noise_sd, ())
-            for year in chronology.index
-        }
-    )
+    climate = noisy_run.climate.drop_duplicates("year").set_index("year")
+    weather = climate["factor"].loc[chronology.index]
     assert chronology["std"].iloc[10:].corr(weather.iloc[10:]) > 0.5
 
 

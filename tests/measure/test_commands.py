@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 from pandas.testing import assert_frame_equal
 
+from forest.measure.gaps import gap_share
 from forest.measure.products import read_products
-from forest.measure.tables import buck_run, measure_run
+from forest.measure.tables import buck_run, measure_run, plot_of
 from forest.record.run import open_run
 from forest.record.writer import RunWriter
 from forest.simulation import simulate
@@ -42,8 +43,11 @@ def test_a_table_of_trees(run_file: Path, tmp_path: Path, name: str) -> None:
 def test_species_on_the_screen(run_file: Path) -> None:
     code, out, _ = forest("measure", run_file)
     assert code == 0
-    rows = {" ".join(line.split()[:-9]): line.split()[-9:] for line in out.splitlines()[2:]}
+    *lines, gaps = out.splitlines()[2:]
+    rows = {" ".join(line.split()[:-9]): line.split()[-9:] for line in lines}
     with open_run(run_file) as run:
+        share = gap_share(measure_run(run, 2008), plot_of(run.scenario))
+        assert f"m: {100 * share:.0f} % of the plot; " in gaps
         last = run.stand[run.stand["year"] == 2008].set_index("species")
     assert set(rows) == {"pinus sylvestris", "fagus sylvatica", "all"}
     for name, cells in rows.items():

@@ -11,6 +11,7 @@ import pytest
 from forest.errors import InputError
 from forest.measure.biomass import Compartments, carbon_table, compartments, stand_biomass
 from forest.measure.bucking import Product
+from forest.measure.gaps import gap_share
 from forest.measure.increments import growth_table, volume_growth
 from forest.measure.site_index import site_index_of
 from forest.measure.tables import (
@@ -79,8 +80,10 @@ def test_indices_of_a_stand(run: Run):
     assert 0 < got["summation_sdi"] <= row["sdi"]
     assert got["species_profile"] == pytest.approx(got["relative_species_profile"] * np.log(2 * 3))
     assert got["bal_m2ha"] == pytest.approx(trees["bal_m2ha"].mean())
+    assert got["gap_share"] == gap_share(trees, plot_of(run.scenario))
     nobody = stand_indices(trees[:0], plot_of(run.scenario))
     assert nobody.pop("summation_sdi") == 0.0
+    assert nobody.pop("gap_share") == 1.0
     assert np.isnan(list(nobody.values())).all()
 
 

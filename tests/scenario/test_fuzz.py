@@ -18,7 +18,7 @@ seed = 3
 [plot]
 size_m = [10, 10]
 boundary = "periodic"
-[weather]
+[climate]
 extreme_years = [{year = 2001, factor = 0.5}]
 [environment.shadow]
 voxel_m = 0.2

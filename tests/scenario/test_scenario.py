@@ -58,7 +58,7 @@ obstacles = [
     {kind = "box", min_m = [0, 0, 0], max_m = [1, 1, 1]},
     {kind = "mesh", file = "house.stl"},
 ]
-weather.extreme_years = [{year = 2001, factor = 0.5}]
+climate.extreme_years = [{year = 2001, factor = 0.5}]
 planting = {kind = "regular", spacing_m = [2, 2]}
 [environment.markers]
 envelope = [{shape = "box", center_m = [5, 5, 5], size_m = [4, 4, 4]}]
@@ -117,12 +117,12 @@ def test_overrides() -> None:
             "title=a plain text",
             "plot.size_m = [60, 40]",
             "species.picea_abies.carbon.sapwood_years=30",
-            "weather.extreme_years=[{year = 2001, factor = 0.5}]",
+            "climate.extreme_years=[{year = 2001, factor = 0.5}]",
         ]
     )
     assert (changed.years, changed.title, changed.plot.size_m) == (3, "a plain text", (60, 40))
     assert changed.species_list[0].carbon.sapwood_years == 30
-    assert changed.weather.extreme_years[0].year == 2001
+    assert changed.climate.extreme_years[0].year == 2001
     assert changed.output.sample_trees.at_year == 2002
     assert changed.planting == scenario.planting
     assert scenario.with_overrides([]) == scenario
