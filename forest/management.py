@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.dynamics.acts import acts_of
+from forest.dynamics.snags import is_left
 from forest.errors import InputError, nearest
 from forest.record.schema import CAUSES
 from forest.scenario.acts import Branches
@@ -17,6 +18,8 @@ from forest.trees.pruning import choose_branches, cut_branches, find_cuts
 from forest.yearbook import Event, Loss
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from forest.stand import Stand
 
 
@@ -97,11 +100,46 @@ def fell(stand: Stand, tree_ids: Sequence[int], cause: str) -> None:
 
 
 def blow(stand: Stand, speed_m_s: float, direction_deg: float) -> list[int]:
-    """Let a storm blow; see `forest.Stand.blow`."""
+    """Let a storm break and uproot trees between two years.
+
+    Their events, and the rows of `/storms`, come with the next year's record.
+
+    Parameters
+    ----------
+    stand : Stand
+    speed_m_s : float
+        Mean wind at the height of the canopy's top over open land, m/s.
+    direction_deg : float
+        Azimuth towards which it blows, from x towards y.
+
+    Returns
+    -------
+    list of int
+        Ids of the trees that fell.
+
+    Raises
+    ------
+    InputError
+        If there is no such storm.
+    """
     fallen = stand.storms.blow(stand, speed_m_s, direction_deg)
     ids: list[int] = stand.rows.tree_id[fallen].tolist()
     take_out(stand, fallen.tolist(), "windthrown", "wind")
     return ids
+
+
+def critical_wind(stand: Stand, direction_deg: float) -> pd.DataFrame:
+    """Tell the storms of a direction that the trees would not withstand; none falls.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per tree of at least `wind.from_height_m`, with the columns of `/storms` that need
+        no storm.
+    """
+    import pandas as pd
+
+    return pd.DataFrame(stand.storms.critical(stand, direction_deg))
 
 
 def take_out(stand: Stand, rows: Sequence[int], kind: str, cause: str) -> None:
@@ -116,7 +154,11 @@ def take_out(stand: Stand, rows: Sequence[int], kind: str, cause: str) -> None:
         As in `/events`.
     """
     measures = stand.measure()
+    if stand.regeneration is not None and kind == "felled":
+        stand.regeneration.note_stumps(stand.rows, rows, measures)
     alive = np.ones(len(stand.rows.tree_id), np.bool_)
+    if stand.dead_wood is not None and is_left(kind, cause):
+        stand.dead_wood.leave(stand, list(dict.fromkeys(rows)), measures)
     for row in rows:
         if alive[row]:
             stand.pending.append(Event.of(stand, row, kind, cause, measures))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forest import establishment, management
-from forest.dynamics.mortality import Death, starved
+from forest.dynamics import mortality
+from forest.dynamics.mortality import Death
 from forest.dynamics.planting import headings
+from forest.dynamics.snags import DeadWood
 from forest.dynamics.storms import Storms
 from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
@@ -22,14 +24,24 @@ from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds
+from forest.inventory import Built, settle
 from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
+from forest.regeneration import Regeneration
+from forest.scenario.inventory import Inventory
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.yearbook import Event, Loss, YearRecord, record_year, sample_serials
+from forest.yearbook import (
+    Event,
+    Loss,
+    YearRecord,
+    record_year,
+    sample_serials,
+    snag_columns,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,6 +57,8 @@ class Stand:
     ----------
     scenario : Scenario
         What to grow, and where.
+    say : callable, optional
+        Told how the nursery goes on where the stand starts from an inventory.
 
     Attributes
     ----------
@@ -68,23 +82,34 @@ class Stand:
         What bends and holds the trees, where the scenario has mechanics.
     climate : Climate
         What each year is like, and what the species make of it.
+    regeneration : Regeneration or None
+        Seeds and seedlings, where the scenario has regeneration.
     surroundings : Surroundings
         Light and space.
-    storms : Storms
-        The winds that throw trees.
+    built : Built or None
+        How near the first trees are to the inventory that they were built from.
+    dead_wood : DeadWood or None
+        Snags and lying dead wood, where the scenario has snags.
     memories : dict of str to Memory
         The parts that remember something between years, for checkpoints.
     seconds : dict of str to float
         Wall time spent in each phase of the year so far.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    built: Built | None = None
+
+    def __init__(self, scenario: Scenario, say: Callable[[str], None] = lambda _: None) -> None:
         self._start(scenario)
+        if isinstance(scenario.planting, Inventory):
+            self.built = settle(self, scenario.planting, Stand, say)
+            management.check_due(self)
+            return
         first = establishment.Newcomers.planted(
             *scenario.planting_positions(), headings(*scenario.planting_leans())
         )
         establishment.establish(self, first, "planted", self._traits)
         management.check_due(self)  # what cannot be done in the first year is refused before it
+        mortality.check_due(self)
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -111,6 +136,14 @@ class Stand:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
             plot = Plot(*scenario.plot.size_m, scenario.plot.boundary == "periodic")
             self.mechanics = Mechanics(spec, self.species, self.pipe_exponent, plot)
+        self.dead_wood: DeadWood | None = None
+        if scenario.mortality.snags:
+            self.dead_wood = DeadWood(self.species, scenario.seed)
+            self.memories["deadwood"] = self.dead_wood
+        self.regeneration: Regeneration | None = None
+        if scenario.regeneration is not None and self.surroundings.canopy is not None:
+            self.regeneration = Regeneration(scenario, self.surroundings.canopy)
+            self.memories["regeneration"] = self.regeneration
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -133,6 +166,7 @@ class Stand:
         """
         self._clock = time.perf_counter()
         self.climate.check_known(self.year + 1)
+        mortality.check_due(self)
         management.act(self, self._traits.of["branch_pipe"])
         self._lap("act")
         self.steps += 1
@@ -151,12 +185,20 @@ class Stand:
         self._bend()
         measures, deaths = self._die()
         record = record_year(self, measures, deaths, accounts, before, rings)
+        grown = self.rows
         self._bury(deaths, measures)
         self._lap("record")
+        if self.regeneration is not None:
+            seedlings = self.regeneration.year(self, grown, measures, deaths, self._traits)
+            record.tables["regeneration"] = seedlings
+            self._lap("regenerate")
         return record
 
     def _expose(self) -> None:
-        self.surroundings.expose(self.arena.metamers, self.rows, self.steps)
+        dead = None
+        if self.dead_wood is not None:
+            dead = self.dead_wood.plant_area(self.steps, self.surroundings.voxel_m)
+        self.surroundings.expose(self.arena.metamers, self.rows, self.steps, dead)
         self._lap("expose")
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
@@ -245,10 +287,9 @@ class Stand:
             self._full_light,
             self._ring_heights,
         )
-        deaths: list[Death] = []
-        if not self._paper:
-            deaths = starved(self.rows, measures.buds, self._traits.of["suppression_years"])
-        deaths = self.storms.of_year(self, measures, deaths)
+        deaths = self.storms.of_year(self, measures, mortality.deaths_of(self, measures))
+        if self.dead_wood is not None:
+            self.dead_wood.pass_year(self, deaths, measures)
         self._lap("measure")
         return measures, deaths
 
@@ -355,20 +396,7 @@ class Stand:
         return management.prune(self, tree_id, metamer, branches, branch_pipe)
 
     def blow(self, speed_m_s: float, direction_deg: float = 0.0) -> list[int]:
-        """Let a storm break and uproot trees at once; see `forest.dynamics.storms`.
-
-        Parameters
-        ----------
-        speed_m_s : float
-            Mean wind at the height of the canopy's top over open land, m/s.
-        direction_deg : float
-            Azimuth towards which it blows, from x towards y.
-
-        Returns
-        -------
-        list of int
-            Ids of the trees that fell.
-        """
+        """Let a storm throw trees now; give their ids. See `forest.management.blow`."""
         return management.blow(self, speed_m_s, direction_deg)
 
     # ------------------------------------------------------------------ what it is now
@@ -409,14 +437,15 @@ class Stand:
         return pd.DataFrame(columns)
 
     def critical_wind(self, direction_deg: float = 0.0) -> pd.DataFrame:
-        """The storms of a direction that the trees would not stand; none falls.
+        """Winds that trees do not withstand; a row each. See `forest.management.critical_wind`."""
+        return management.critical_wind(self, direction_deg)
 
-        A row per tree of at least `wind.from_height_m`, with the columns of `/storms` that need no
-        storm.
-        """
+    @property
+    def snags(self) -> pd.DataFrame:
+        """The dead trees that stand now, a row each; none where the scenario has no snags."""
         import pandas as pd
 
-        return pd.DataFrame(self.storms.critical(self, direction_deg))
+        return pd.DataFrame(snag_columns(self))
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""

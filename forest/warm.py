@@ -37,6 +37,7 @@ _VARIANTS = {
     ],
     "light, costs, mechanics": ["mechanics={wind_m_s=10, wind_growth=true}"],
     "light, costs, stability": ["mechanics={bending=false}"],
+    "light, costs, seedlings": ["regeneration={seed_rain={generic_deciduous=50}}"],
     "light and markers": ["environment={shadow={}, canopy={}, markers={}}"],
 }
 

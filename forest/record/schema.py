@@ -24,7 +24,30 @@ CAUSES = (
     "thinning",
     "harvest",
     "no_buds",
+    "fire",
+    "insects",
+    "disease",
+    "browsing",
+    "drought",
+    "other",
+    "tending",
 )
+
+#: What trees die of where they stand, and why trees are felled: columns of `Run.ledger`.
+DEATH_CAUSES = (
+    "suppression",
+    "no_buds",
+    "age",
+    "background",
+    "buckling",
+    "fire",
+    "insects",
+    "disease",
+    "browsing",
+    "drought",
+    "other",
+)
+FELLING_CAUSES = ("thinning", "harvest", "tending")
 
 #: What a storm does to a tree.
 STORM_OUTCOMES = ("stood", "broken", "uprooted")
@@ -229,6 +252,30 @@ STABILITY = Table(
     ),
 )
 
+_WOOD_OF = "of the stems, less what has decayed"
+_MASS_OF = "of stems and branches, less what has decayed"
+
+DEADWOOD = Table(
+    "a year and species, and one for all species, where the scenario has snags",
+    (
+        _YEAR,
+        _SPECIES_OR_ALL,
+        _stand("snags_ha", "1/ha", "dead trees that stand"),
+        _stand("new_snags_ha", "1/ha", "trees that died in the year and stand"),
+        _stand("fallen_snags_ha", "1/ha", "snags that fell in the year"),
+        _stand("standing_m3ha", "m3/ha", f"snags: volume {_WOOD_OF}"),
+        _stand("lying_m3ha", "m3/ha", f"lying dead wood: volume {_WOOD_OF}"),
+        _stand("input_m3ha", "m3/ha", "volume of the trees that died in the year"),
+        _stand("fallen_m3ha", "m3/ha", "what came from standing to lying in the year"),
+        _stand("decayed_m3ha", "m3/ha", "what decayed in the year"),
+        _stand("standing_tha", "t/ha dry mass", f"snags: mass {_MASS_OF}"),
+        _stand("lying_tha", "t/ha dry mass", f"lying dead wood: mass {_MASS_OF}"),
+        _stand("input_tha", "t/ha dry mass", "mass of the trees that died in the year"),
+        _stand("fallen_tha", "t/ha dry mass", "what came from standing to lying in the year"),
+        _stand("decayed_tha", "t/ha dry mass", "what decayed in the year"),
+    ),
+)
+
 CLIMATE = Table(
     "a year and species: the year's climate, and what the species makes of it",
     (
@@ -239,6 +286,27 @@ CLIMATE = Table(
         _number("drought_index", "", "drought index; below 0 dry", dtype="float64"),
         Column("growth_index", "float64", "", "factor on the income of all species"),
         Column("factor", "float64", "", "factor on the species' income, growth index included"),
+    ),
+)
+
+REGENERATION = Table(
+    "a year and species, where the scenario has regeneration",
+    (
+        _YEAR,
+        _SPECIES,
+        _stand("mast", "", "factor of the year on the species' seeds; 1 in the mean"),
+        _stand("seeds_ha", "1/ha", "viable seeds that are expected to fall"),
+        _stand("germinated_ha", "1/ha", "seedlings that outlived their first summer"),
+        _stand("sprouts_ha", "1/ha", "sprouts from stumps"),
+        _stand("died_ha", "1/ha", "older seedlings that died in the year's light"),
+        _stand("crowded_ha", "1/ha", "seedlings that found no room"),
+        _stand("recruits_ha", "1/ha", "seedlings that became trees; their events are next year's"),
+        _stand("n_ha", "1/ha", "seedlings at the end of the year"),
+        _stand("n_low_ha", "1/ha", "those below 0.1 m"),
+        _stand("n_high_ha", "1/ha", "those of 0.5 m and more"),
+        _stand("mean_height_m", "m", "their mean height"),
+        _stand("lai", "m2/m2", "their leaf area index, one-sided"),
+        _stand("reserve_kg_ha", "kg dry mass/ha", "what they have stored"),
     ),
 )
 
@@ -286,7 +354,9 @@ TABLES: dict[str, Table] = {
     "rings": RINGS,
     "carbon": CARBON,
     "stability": STABILITY,
+    "deadwood": DEADWOOD,
     "climate": CLIMATE,
+    "regeneration": REGENERATION,
     "storms": STORMS,
 }
 

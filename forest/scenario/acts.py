@@ -140,7 +140,9 @@ class Fell(Table):
     kind: Literal["fell"] = quantity("fell", "kind of act", unit="")
     year: int = _year()
     tree_ids: tuple[_Id, ...] = quantity(..., "the trees", unit="", min_length=1, max_length=_MOST)
-    cause: Literal["harvest", "thinning"] = quantity("harvest", "why, in the events", unit="")
+    cause: Literal["harvest", "thinning", "tending"] = quantity(
+        "harvest", "why, in the events; what tending fells is left lying", unit=""
+    )
 
 
 class Plant(Table):

@@ -35,13 +35,15 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
     return [
         ("title", scenario.title or "(none)"),
         ("plot", f"{width:g} x {depth:g} m, {scenario.plot.boundary}"),
-        ("trees", f"{trees} ({len(kind) / (width * depth) * 1e4:,.0f} per ha)"),
+        ("trees", f"{trees or 'none'} ({len(kind) / (width * depth) * 1e4:,.0f} per ha)"),
         ("years", f"{scenario.years} ({scenario.start_year} to {last})"),
         ("mode", scenario.mode),
         ("climate", _climate(scenario)),
         ("environment", " + ".join(parts)),
         ("bud fate", scenario.growth.bud_fate),
         ("mechanics", _mechanics(scenario)),
+        ("mortality", _mortality(scenario)),
+        ("regeneration", _regeneration(scenario)),
         ("wind", _wind(scenario)),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
         ("acts", _acts(scenario)),
@@ -72,6 +74,24 @@ def _mechanics(scenario: Scenario) -> str:
     how = f"bending, righting {mechanics.righting}" if mechanics.bending else "stability alone"
     answered = ", answered by growth" if mechanics.wind_growth else ""
     return f"{how}, wind {mechanics.wind_m_s:g} m/s{answered}"
+
+
+def _mortality(scenario: Scenario) -> str:
+    mortality = scenario.mortality
+    causes = [key for key in ("age", "background", "buckling") if getattr(mortality, key)]
+    if mortality.events:
+        causes.append(f"{len(mortality.events)} disturbances")
+    kept = "; snags and dead wood" if mortality.snags else ""
+    paper = scenario.mode == "paper"
+    return (", ".join([*([] if paper else ["suppression"]), *causes]) or "none") + kept
+
+
+def _regeneration(scenario: Scenario) -> str:
+    regeneration = scenario.regeneration
+    if regeneration is None:
+        return "none"
+    rain = ", ".join(name for name, seeds in regeneration.seed_rain.items() if seeds)
+    return f"trees from {regeneration.handover_height_m:g} m; seed from outside: {rain or 'none'}"
 
 
 def _wind(scenario: Scenario) -> str:

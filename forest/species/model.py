@@ -12,6 +12,8 @@ from pydantic import Field, model_validator
 from forest.errors import nearest
 from forest.species.anchorage import Anchorage
 from forest.species.curves import Curve, FactorCurve
+from forest.species.mortality import Mortality
+from forest.species.regeneration import Regeneration
 from forest.species.response import Response
 from forest.species.schema import Refusal, Table, quantity
 
@@ -362,7 +364,9 @@ SECTIONS: dict[str, type[Table]] = {
     "balance": Balance,
     "mechanics": Mechanics,
     "mensuration": Mensuration,
+    "mortality": Mortality,
     "response": Response,
+    "regeneration": Regeneration,
     "anchorage": Anchorage,
 }
 
@@ -386,7 +390,9 @@ class Species(Table):
     balance: Balance = Balance()
     mechanics: Mechanics = Mechanics()
     mensuration: Mensuration = Mensuration()
+    mortality: Mortality = Mortality()
     response: Response = Response()
+    regeneration: Regeneration = Regeneration()
     anchorage: Anchorage = Anchorage()
     sources: dict[str, dict[str, str]] = Field(
         default={},
