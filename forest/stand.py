@@ -127,10 +127,7 @@ class Stand:
         self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.storms = Storms(scenario, self.pipe_exponent)
-        self.memories: dict[str, Memory] = {
-            "surroundings": self.surroundings,
-            "storms": self.storms,
-        }
+        self.memories = dict[str, Memory](surroundings=self.surroundings, storms=self.storms)
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
