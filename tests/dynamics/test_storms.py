@@ -29,7 +29,7 @@ plot = {{ size_m = [40, 10], boundary = "periodic" }}
 environment = {{ shadow = {{}}, canopy = {{}} }}
 species = {{ picea_abies = {{}} }}
 planting = {{ kind = "random", density_ha = 4500, min_distance_m = 0.8 }}
-output = {{ sample_trees = {{ dbh_quantiles = [0.0, 1.0], at_year = 2010 }} }}
+output = {{ sample_trees = {{ dbh_quantiles = [0.0, 1.0], at_year = 2020 }} }}
 wind = {{ storms = [{{ year = 2026, speed_m_s = {SPEED} }}] }}
 """
 
