@@ -21,6 +21,7 @@ sys.path.insert(0, str(ROOT))
 
 import forest  # noqa: E402
 from analysis.common import Study, enough, panels, script  # noqa: E402
+from analysis.fit_targets import KOIVISTO  # noqa: E402
 from forest.record.run import Run  # noqa: E402
 
 SCENARIO = ROOT / "scenarios" / "self_thinning.toml"
@@ -29,14 +30,6 @@ FIGURE = ROOT / "docs" / "gallery" / "self_thinning.png"
 
 SEEDS = (1, 2, 3)
 HARD_YEAR = 60  # stand age in which income is halved
-
-#: Koivisto: Scots pine, Finland, Myrtillus type, natural normal stands; age: N, Dq, Hdom, G.
-KOIVISTO = {
-    20: (7900, 4.8, 6.7, 14.0),
-    40: (2700, 11.2, 14.9, 26.6),
-    60: (1415, 17.2, 21.1, 32.9),
-    80: (940, 22.0, 25.0, 35.7),
-}
 
 #: The other species: 2500 seedlings per ha on 20 x 20 m.
 PURE = ["plot.size_m=[20, 20]", "planting.density_ha=2500", "years=80", "site.latitude_deg=51"]
@@ -157,14 +150,15 @@ def pure(species: str, seed: int = 1) -> History:
     return grow(scenario.with_overrides([*PURE, f"seed={seed}"]))
 
 
+_BESIDE = ("n_ha", "qmd_cm", "top_height_m", "basal_area_m2ha")
 _HEAD = ["N /ha", "Dq cm", "top height m", "G m²/ha", "V m³/ha", "LAI", "floor light"]
 
 _INTRO = """\
 # Stands held against yield tables
 
 Written by `python analysis/self_thinning.py`. The species' parameters were set by trial towards
-such figures, the slope of self-thinning among them (see each file's `[sources]`), so nearness to
-them is no proof of the model. Different seeds and the response to weather were not aimed at.
+such figures, or [fitted](fit.md) to them, so nearness to them is no proof of the model. Different
+seeds, this density and the response to weather were not aimed at.
 """
 
 
@@ -190,7 +184,8 @@ def _means_table(pines: dict[int, History]) -> str:
     mean = sum(history.stand.drop(columns="species") for history in pines.values()) / len(pines)
     rows = []
     for age in range(20, len(mean) + 1, 20):
-        beside = [f"{value:g}" for value in KOIVISTO.get(age, ())] or ["–"] * 4
+        known = age in KOIVISTO.index
+        beside = [f"{KOIVISTO.loc[age, name]:g}" if known else "–" for name in _BESIDE]
         rows.append([str(age), *_cells(mean.loc[age]), *beside])
     head = ["age", *_HEAD]
     return _table(head + [f"Koivisto {name}" for name in ("N", "Dq", "Hdom", "G")], rows)
@@ -234,10 +229,7 @@ def _draw(pines: dict[int, History], weather: History) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
     for seed, history in pines.items():
         left.loglog(history.stand["qmd_cm"], history.stand["n_ha"], label=f"seed {seed}")
-    left.loglog(
-        [row[1] for row in KOIVISTO.values()], [row[0] for row in KOIVISTO.values()], "ks",
-        label="Koivisto",
-    )  # fmt: skip
+    left.loglog(KOIVISTO["qmd_cm"], KOIVISTO["n_ha"], "ks", label="Koivisto")
     across = np.array([10.0, 32.0])
     left.loglog(across, 1008.0 * (across / 25.4) ** -1.605, "k:", label="SDI 1008, slope -1.605")
     left.set(xlabel="Dq, cm", ylabel="trees per ha", xlim=(4, 40), ylim=(300, 9000))

@@ -21,6 +21,8 @@ from forest.growth.budget import (
     SPEND,
     UPKEEP,
     affordable_scale,
+    extension,
+    light_response,
     path_lengths,
     site_income,
 )
@@ -50,8 +52,11 @@ def income_rate(traits, sp, vigour, year):  # type: ignore[no-untyped-def]
 
 @njit
 def unit_costs(traits, sp):  # type: ignore[no-untyped-def]
-    """Cost (kg) and length (m) of one new metamer by order: primary wood and first leaves."""
-    units = np.empty((MAX_ORDERS, 2))
+    """Cost (kg), length (m) and primary wood (kg) of one new metamer at the ground, by order.
+
+    The cost is that of its primary wood and first leaves.
+    """
+    units = np.empty((MAX_ORDERS, 3))
     wood = traits.of[sp].density * 0.25 * np.pi * traits.of[sp].twig_diameter ** 2
     for o in range(MAX_ORDERS):
         factor = curve(
@@ -59,6 +64,7 @@ def unit_costs(traits, sp):  # type: ignore[no-untyped-def]
         )
         units[o, 1] = traits.of[sp].internode_length * factor
         units[o, 0] = wood * units[o, 1] + traits.of[sp].leaf_mass
+        units[o, 2] = wood * units[o, 1]
     return units
 
 
@@ -232,7 +238,9 @@ def _keep_sites(arena, s, n, t, sp, year, tree_id, rate, path, pipe_path):  # ty
         sites = (1 if state & TERMINAL else 0) + (1 if state & LATERAL else 0)
         if sites == 0:
             continue
-        earned = site_income(np.float64(arena.light[i]), path[k], rate, t.of[sp].hydraulic_length)
+        light = np.float64(arena.light[i])
+        light = light_response(light, year.full_light, t.of[sp].light_half)
+        earned = site_income(light, path[k], rate, t.of[sp].hydraulic_length)
         income += sites * earned
         leaves += sites * leaf
         if earned < leaf + minimal * pipe_path[k]:
@@ -263,7 +271,7 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
     e = s + n
     sp = trees.species[row]
     tree = tree_part(arena, s, e)
-    path, pipe_path = work[4], work[5]
+    path, pipe_path, stretch = work[4], work[5], work[6]
     path_lengths(tree.parent, tree.order, tree.length, t.of[sp].branch_pipe, path, pipe_path)
     rate = income_rate(t, sp, np.float64(trees.vigour[row]), year)
     income, leaves, upkeep = _keep_sites(
@@ -301,11 +309,14 @@ def _allocate_balanced(arena, trees, row, t, year, accounts, priority, balance, 
         if not arena.state[s + i] & LATERAL:
             work[3, i] = 0.0
     resource = tree.resource
+    for i in range(n):
+        stretch[i] = extension(np.float64(tree.tip[i, 2]), t.of[sp].turgor_limit)
     scale = affordable_scale(
         resource,
         work[2],
         work[3],
         pipe_path,
+        stretch,
         tree.order,
         price,
         pipe_cost,

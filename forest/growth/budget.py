@@ -24,6 +24,9 @@ SPEND = 6
 ACCOUNTS = 7
 
 
+#: An internode at the turgor limit, relative to one at the ground: leaves still need their nodes.
+LEAST_EXTENSION = 0.1
+
 # The histogram of thresholds: s from 2**-_OCTAVES to 1 in _STEPS bins per octave.
 _OCTAVES = 20
 _STEPS = 32
@@ -46,9 +49,32 @@ def path_lengths(parent, order, length, branch_pipe, path, pipe_path):  # type: 
 
 
 @njit
+def light_response(light, full_light, half):  # type: ignore[no-untyped-def]
+    """The light that leaves make full use of: all of it, or what income saturating with light uses.
+
+    Leaves earn l (1 + c) / (l + c) of what they earn in full light, l being their share of it
+    (Pacala et al. 1996, G1 l / (G1 / S + l)); the smaller c, the `half`, the less shade takes.
+    """
+    if half <= 0.0:
+        return light
+    at = half * full_light
+    return light * (full_light + at) / (light + at)
+
+
+@njit
 def site_income(light, path, rate, hydraulic_length):  # type: ignore[no-untyped-def]
     """Income of one site, kg: light times rate, less with height (Ryan & Yoder 1997)."""
     return rate * light / (1.0 + path / hydraulic_length)
+
+
+@njit
+def extension(height, turgor_limit):  # type: ignore[no-untyped-def]
+    """Length of a new internode relative to one at the ground, at a height (m).
+
+    Water hangs from the top of a tree: its tension grows with height, and the turgor that
+    stretches new cells falls, down to nothing at `turgor_limit` (Koch et al. 2004; m).
+    """
+    return max(1.0 - height / turgor_limit, LEAST_EXTENSION)
 
 
 @njit
@@ -78,7 +104,17 @@ def threshold_bin(s):  # type: ignore[no-untyped-def]
 
 @njit
 def affordable_scale(  # type: ignore[no-untyped-def]
-    resource, v_main, v_side, pipe_path, order, unit_cost, pipe_cost, branch_pipe, most, budget
+    resource,
+    v_main,
+    v_side,
+    pipe_path,
+    stretch,
+    order,
+    unit_cost,
+    pipe_cost,
+    branch_pipe,
+    most,
+    budget,
 ):
     """Find the largest s in (0, 1] whose new metamers cost at most `budget`.
 
@@ -89,8 +125,10 @@ def affordable_scale(  # type: ignore[no-untyped-def]
     ----------
     resource : float32 (n, 2)
         Fractions carried by the terminal and lateral buds.
-    unit_cost : float64 (orders, 2)
-        Cost (kg) and length (m) of one metamer by order.
+    stretch : float64 (n,)
+        Length of new internodes relative to those at the ground.
+    unit_cost : float64 (orders, 3)
+        Cost (kg), length (m) and primary wood (kg, part of the cost) of one metamer by order.
     pipe_cost : float
         Cost of the first pipe, kg per m.
     most : int
@@ -106,8 +144,8 @@ def affordable_scale(  # type: ignore[no-untyped-def]
                 continue
             made = min(int(v + carried), most)
             o = np.int64(order[i]) + bud
-            cost = unit_cost[min(o, top), 0]
-            step = unit_cost[min(o, top), 1]
+            cost = unit_cost[min(o, top), 0] - (1.0 - stretch[i]) * unit_cost[min(o, top), 2]
+            step = unit_cost[min(o, top), 1] * stretch[i]
             if o > 0:
                 step *= branch_pipe
             for k in range(1, made + 1):

@@ -61,12 +61,14 @@ TRAITS = (
     "leaf_lifespan",
     "leaf_retention",
     "light_use",
+    "light_half",
     "maintenance",
     "sapwood_years",
     "reserve_fraction",
     "ring_fraction",
     "branch_pipe",
     "hydraulic_length",
+    "turgor_limit",
     "first_pipe",
     "suppression_ratio",
     "suppression_years",
@@ -186,6 +188,7 @@ def species_traits(
                 curve_y[row, k, j] = y
     stiffness = each("mechanics", "modulus_juvenile_gpa", 1e9) * each("mechanics", "sag_limit_rad")
     hydraulic = each("carbon", "hydraulic_length_m")
+    turgor = each("carbon", "turgor_limit_m")
     values = {
         "internode_length": each("architecture", "internode_length_m"),
         "branching_angle": each("architecture", "branching_angle_deg", degree),
@@ -214,12 +217,14 @@ def species_traits(
         "leaf_lifespan": each("leaves", "lifespan_years"),
         "leaf_retention": each("leaves", "retention_years"),
         "light_use": each("carbon", "light_use_efficiency_kg_m2"),
+        "light_half": each("carbon", "light_half_saturation"),
         "maintenance": each("carbon", "maintenance_per_year"),
         "sapwood_years": each("carbon", "sapwood_years"),
         "reserve_fraction": each("carbon", "reserve_fraction"),
         "ring_fraction": each("carbon", "ring_fraction"),
         "branch_pipe": each("carbon", "branch_pipe_ratio"),
         "hydraulic_length": np.where(hydraulic > 0.0, hydraulic, np.inf),
+        "turgor_limit": np.where(turgor > 0.0, turgor, np.inf),
         "first_pipe": each("carbon", "first_pipe_diameter_m"),
         "suppression_ratio": each("carbon", "suppression_ratio"),
         "suppression_years": each("carbon", "suppression_years"),

@@ -21,6 +21,7 @@ from forest.growth.budget import (
     RESERVE_CHANGE,
     RING,
     SPEND,
+    light_response,
     path_lengths,
     site_income,
 )
@@ -185,6 +186,7 @@ def _thicken_balanced(arena, trees, row, t, year, wind_need, accounts, work, int
     for i in range(n):
         if surplus[i] > 0.0:
             light = np.float64(arena.light[s + i])
+            light = light_response(light, year.full_light, t.of[sp].light_half)
             earned = site_income(light, path[i], rate, t.of[sp].hydraulic_length)
             surplus[i] *= max(earned - leaf, 0.0)
     if year.balance:

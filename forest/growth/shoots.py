@@ -14,6 +14,7 @@ from forest import random
 from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.environment.obstacles import Solid, inside
+from forest.growth.budget import extension
 from forest.growth.curves import curve
 from forest.growth.dealing import BINS, Deal
 from forest.growth.parameters import (
@@ -279,6 +280,8 @@ def _extend_tree(arena, trees, row, shoots, toward, t, year, solid, voxel_m):  #
             if year.paper and t.of[sp].sylleptic == 0.0:
                 # l = v / n (4.2); only a shoot cut off at its maximum could get longer internodes
                 unit *= min(v / n, 2.0)
+            if not year.paper:
+                unit *= extension(np.float64(arena.tip[s + p, 2]), t.of[sp].turgor_limit)
             hx, hy, hz = bud_heading(arena, s, p, bud)
             arena.resource[s + p, bud] = 0.0
             made = 0

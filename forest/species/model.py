@@ -162,6 +162,14 @@ class Carbon(Table):
     light_use_efficiency_kg_m2: float = quantity(
         1.3, "yearly income per leaf area at full light (epsilon)", unit="kg/m2", gt=0, le=20
     )
+    light_half_saturation: float = quantity(
+        0.0,
+        "light, as a share of full light, at which leaves earn half of what endless light would "
+        "give; the less, the more tolerant of shade (Pacala et al. 1996); 0 = income in proportion "
+        "to light",
+        ge=0,
+        le=100,
+    )
     maintenance_per_year: float = quantity(
         0.01, "upkeep as a share of the sapwood's mass", unit="1/year", ge=0, le=1
     )
@@ -179,6 +187,14 @@ class Carbon(Table):
         30.0,
         "path from the ground at which hydraulic limitation halves income "
         "(Ryan and Yoder 1997); 0 = off",
+        unit="m",
+        ge=0,
+        le=10000,
+    )
+    turgor_limit_m: float = quantity(
+        0.0,
+        "height at which water tension leaves new internodes no length: they shorten linearly "
+        "towards it (Koch et al. 2004); 0 = off",
         unit="m",
         ge=0,
         le=10000,

@@ -15,6 +15,8 @@ from forest.growth.budget import (
     SPEND,
     UPKEEP,
     affordable_scale,
+    extension,
+    light_response,
     lowest_scale,
     path_lengths,
     threshold_bin,
@@ -37,8 +39,11 @@ def prices_of(traits: SpeciesTraits, vigour: float, year: Year) -> slow.Prices:
     """The numbers that the twin needs, from the species' record."""
     of = traits.of[0]
     rate = of["light_use"] * of["leaf_area"] * vigour * year.income_factor[0] / year.full_light
-    names = set(slow.Prices.__dataclass_fields__) - {"rate"}
-    return slow.Prices(rate=float(rate), **{name: float(of[name]) for name in names})
+    names = set(slow.Prices.__dataclass_fields__) - {"rate", "full_light"}
+    full = year.full_light
+    return slow.Prices(
+        rate=float(rate), full_light=full, **{name: float(of[name]) for name in names}
+    )
 
 
 @given(seeds, st.sampled_from([0.35, 1.0, 2.0]))
@@ -52,8 +57,28 @@ def test_path_lengths(seed: int, kappa: float) -> None:
         np.testing.assert_allclose(pipe_path[node.index], slow.pipe_path(node, kappa), rtol=1e-5)
 
 
-@given(seeds, st.floats(0.0, 1.2), st.integers(1, 5))
-def test_affordable_scale(seed: int, part: float, most: int) -> None:
+@given(st.floats(0.0, 1.0), st.sampled_from([0.0, 0.3, 2.0]), st.sampled_from([1.0, 4.0]))
+def test_light_response(share: float, half: float, full: float) -> None:
+    """Full light counts fully, shade by more than its share; without a half, by its share."""
+    traits = make_traits(make_species(carbon={"light_half_saturation": half}))
+    prices = prices_of(traits, 1.0, make_year(full_light=full))
+    counted = light_response(share * full, full, half)
+    np.testing.assert_allclose(counted, slow.response(share * full, prices), rtol=1e-12)
+    np.testing.assert_allclose(light_response(full, full, half), full, rtol=1e-12)
+    assert counted >= share * full * (1.0 - 1e-12)
+    if half == 0.0:
+        assert counted == share * full
+
+
+@given(st.floats(0.0, 100.0), st.sampled_from([5.0, 40.0, np.inf]))
+def test_extension(height: float, limit: float) -> None:
+    """Internodes shorten linearly towards the limit, to a tenth; without one not at all."""
+    assert extension(height, limit) == slow.extension(height, limit)
+    assert extension(0.0, limit) == 1.0
+
+
+@given(seeds, st.floats(0.0, 1.2), st.integers(1, 5), st.sampled_from([25.0, np.inf]))
+def test_affordable_scale(seed: int, part: float, most: int, limit: float) -> None:
     """The s that is found pays, and one bin of the histogram (1/32 octave) more does not."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 25))
@@ -61,20 +86,23 @@ def test_affordable_scale(seed: int, part: float, most: int) -> None:
     carried = (rng.random((n, 2)) * 0.99 * (rng.random((n, 2)) < 0.5)).astype(np.float32)
     order = rng.integers(0, 10, n).astype(np.uint8)
     pipe_path = rng.uniform(0.1, 5.0, n)
-    unit = np.column_stack((rng.uniform(0.5, 2.0, 8), rng.uniform(0.1, 0.3, 8)))
+    wood = rng.uniform(0.2, 1.0, 8)
+    unit = np.column_stack((wood + rng.uniform(0.3, 1.0, 8), rng.uniform(0.1, 0.3, 8), wood))
+    stretch = np.array([slow.extension(z, limit) for z in rng.uniform(0.0, 30.0, n)])
     kappa, pipe_cost = 0.35, 0.4
     buds = []
     for i in range(n):
         for bud in range(2):
             on = int(order[i]) + bud
-            cost, step = unit[min(on, 7)]
-            step *= kappa if on > 0 else 1.0
+            cost, step, primary = unit[min(on, 7)]
+            cost = cost - primary + stretch[i] * primary
+            step *= stretch[i] * (kappa if on > 0 else 1.0)
             costs = [cost + pipe_cost * (pipe_path[i] + k * step) for k in range(1, most + 1)]
             buds.append(slow.Bud(v[bud, i], float(carried[i, bud]), tuple(costs)))
     at_most = sum(b.cost(1.0) for b in buds)
     budget = part * at_most
     s = affordable_scale(
-        carried, v[0], v[1], pipe_path, order, unit, pipe_cost, kappa, most, budget
+        carried, v[0], v[1], pipe_path, stretch, order, unit, pipe_cost, kappa, most, budget
     )
     best = slow.affordable(buds, budget)
     assert 0.0 < s <= best
@@ -108,13 +136,14 @@ def _allocated(m, trees, traits, year):  # type: ignore[no-untyped-def]
     return accounts
 
 
-@given(seeds, st.sampled_from([0.0, 0.3, 1.0]))
-def test_yearly_accounts(seed: int, factor: float) -> None:
+@given(seeds, st.sampled_from([0.0, 0.3, 1.0]), st.sampled_from([0.0, 0.5]))
+def test_yearly_accounts(seed: int, factor: float, half: float) -> None:
     """Income, leaves and upkeep site by site; the reserve takes what is not spent."""
     m, trees = random_arena(np.random.default_rng(seed), 3, 25)
     reserve = trees.reserve.copy()
     bad = trees.bad_years.copy()
-    traits, year = make_traits(TREE), make_year(income_factor=factor)
+    tree = make_species(carbon={"light_half_saturation": half})
+    traits, year = make_traits(tree), make_year(income_factor=factor)
     books = [
         slow.books(read_plant(m, trees, r), prices_of(traits, float(trees.vigour[r]), year))
         for r in range(3)

@@ -19,7 +19,7 @@ from tests.reference import pipes as slow
 from tests.reference.plant import read_plant
 
 seeds = st.integers(0, 2**32 - 1)
-TREE = make_species()
+TREE = make_species(carbon={"light_half_saturation": 0.5})
 STEP = 9
 
 

@@ -18,6 +18,7 @@ from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, MAIN, TERMINAL, 
 from forest.trees.table import Trees
 from tests.growth.growing import VOXEL_M, make_species, make_traits, make_year
 from tests.growth.invariants import assert_valid
+from tests.reference import budget as slow_budget
 from tests.reference import shoots as slow
 
 PAPER = make_year(1, paper=True)
@@ -124,6 +125,15 @@ def test_directions_and_lengths(
     assert (m.birth[1:] == 1).all()
     assert m.parent.tolist() == [-1, *range(len(tips))]
     assert m.shoot_height[1:].tolist() == [255 * k // len(tips) for k in range(1, len(tips) + 1)]
+
+
+def test_internodes_shorten_towards_the_turgor_limit() -> None:
+    """A shoot that starts at 0.2 m of a limit of 1 m; the paper's trees know no limit."""
+    carbon = {"turgor_limit_m": 1.0}
+    m, _ = shoot(traits_of(paper=False, carbon=carbon), STAND, terminal=3.5)
+    np.testing.assert_allclose(m.length[1:], 0.2 * slow_budget.extension(0.2, 1.0), rtol=1e-6)
+    m, _ = shoot(traits_of(carbon=carbon), PAPER, terminal=3.0)
+    np.testing.assert_allclose(m.length[1:], 0.2, rtol=1e-6)
 
 
 def test_states_of_a_new_shoot() -> None:

@@ -20,6 +20,8 @@ class Prices:
     maintenance: float
     branch_pipe: float
     hydraulic_length: float
+    light_half: float
+    full_light: float
     first_pipe: float
     twig_diameter: float
     sapwood_years: float
@@ -39,9 +41,23 @@ def pipe_path(node: Node, kappa: float) -> float:
     return sum(n.length * (1.0 if n.order == 0 else kappa) for n in node.down())
 
 
+def response(light: float, prices: Prices) -> float:
+    """The light that counts: saturating, so that shade costs less than its share of light."""
+    half = prices.light_half
+    if half == 0.0:
+        return light
+    share = light / prices.full_light
+    return prices.full_light * share * (1.0 + half) / (share + half)
+
+
 def income(node: Node, prices: Prices) -> float:
     """What one site at a node earns: less at the end of a long way (Ryan & Yoder 1997)."""
-    return prices.rate * node.light / (1.0 + path(node) / prices.hydraulic_length)
+    return prices.rate * response(node.light, prices) / (1.0 + path(node) / prices.hydraulic_length)
+
+
+def extension(height: float, turgor_limit: float) -> float:
+    """Length of a new internode at a height, of one at the ground's (Koch et al. 2004)."""
+    return max(0.1, 1.0 - height / turgor_limit)
 
 
 def leaf_cost(prices: Prices) -> float:
