@@ -226,10 +226,11 @@ def _draw(fitted: Grown, unthinned: Grown, mixed: pd.DataFrame) -> None:
 _INTRO = """\
 # Species fitted to yield tables
 
-Written by `python analysis/fit_species.py`, which also made the fits: with `--species` it moves the
-parameters of the first table by the method of Nelder and Mead on a small plot until the stand comes
-near its targets; values were also set by single trials. So nearness to a species' own targets is no proof of the model. The plots, seeds,
-densities and mixtures below are not those of the fits.
+Written by `python analysis/fit_species.py`. With `--species` it moves the parameters of the first
+table by the method of Nelder and Mead on a small plot until the stand comes near its targets. Those
+of pine were set by such searches and then by single trials against the same targets, those of the
+others by trials alone. So nearness to a species' own targets is no proof of the model. The plots,
+two of the three seeds, the spacings and the mixture below are not those that the values were set by.
 """
 
 
