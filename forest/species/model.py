@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from forest.errors import nearest
+from forest.species.anchorage import Anchorage
 from forest.species.curves import Curve, FactorCurve
 from forest.species.mortality import Mortality
 from forest.species.regeneration import Regeneration
@@ -366,6 +367,13 @@ class Mensuration(Table):
         7.0, "diameter over bark down to which a stem is merchantable", unit="cm", ge=0, le=100
     )
     stump_height_m: float = quantity(0.3, "height of the stump", unit="m", ge=0, le=2)
+    max_sdi: float = quantity(
+        900.0,
+        "stand density index (Reineke) of the densest pure stands",
+        unit="1/ha",
+        ge=100,
+        le=5000,
+    )
 
 
 SECTIONS: dict[str, type[Table]] = {
@@ -382,6 +390,7 @@ SECTIONS: dict[str, type[Table]] = {
     "mortality": Mortality,
     "response": Response,
     "regeneration": Regeneration,
+    "anchorage": Anchorage,
 }
 
 
@@ -407,6 +416,7 @@ class Species(Table):
     mortality: Mortality = Mortality()
     response: Response = Response()
     regeneration: Regeneration = Regeneration()
+    anchorage: Anchorage = Anchorage()
     sources: dict[str, dict[str, str]] = Field(
         default={},
         description="where each value comes from: a table of texts per section",
