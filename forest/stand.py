@@ -14,6 +14,7 @@ from forest.dynamics import mortality
 from forest.dynamics.mortality import Death
 from forest.dynamics.planting import headings
 from forest.dynamics.snags import DeadWood
+from forest.dynamics.storms import Storms
 from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
@@ -128,9 +129,11 @@ class Stand(management.Hand):
         self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.treatments = management.Treatments(self)
+        self.storms = Storms(scenario, self.pipe_exponent)
         self.memories: dict[str, Memory] = {
             "surroundings": self.surroundings,
             "treatments": self.treatments,
+            "storms": self.storms,
         }
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
@@ -288,7 +291,7 @@ class Stand(management.Hand):
             self._full_light,
             self._ring_heights,
         )
-        deaths = mortality.deaths_of(self, measures)
+        deaths = self.storms.of_year(self, measures, mortality.deaths_of(self, measures))
         if self.dead_wood is not None:
             self.dead_wood.pass_year(self, deaths, measures)
         self._lap("measure")

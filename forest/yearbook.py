@@ -90,8 +90,8 @@ class YearRecord(NamedTuple):
         Calendar year.
     tables : dict of table to columns
         The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`, where
-        the scenario has them `/stability`, `/deadwood` and `/regeneration`, and where acts were
-        done `/treatments`.
+        the scenario has them `/stability`, `/deadwood` and `/regeneration`, where acts were done
+        `/treatments`, and where the wind blew `/storms`.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """
@@ -163,6 +163,9 @@ def record_year(
     treatments = stand.treatments.columns()
     if treatments:
         tables["treatments"] = treatments
+    blown = stand.storms.take(stand.year)
+    if blown:
+        tables["storms"] = blown
     return YearRecord(stand.year, tables, _sample_years(stand, deaths, serials_before))
 
 

@@ -102,14 +102,40 @@ def fell(stand: Stand, act: int, felling: Felling, measures: TreeMeasures) -> Tr
     after = stand_now(stand, measures, alive, rows)
     if stand.regeneration is not None:
         stand.regeneration.note_stumps(stand.rows, rows.tolist(), measures)
-    if stand.dead_wood is not None and is_left("felled", felling.cause):
+    left = take_out(stand, rows, "felled", felling.cause, measures)
+    stand.treatments.note(act, felling.kind, before, after)
+    return left
+
+
+def take_out(
+    stand: Stand, rows: NDArray[np.int64], kind: str, cause: str, measures: TreeMeasures
+) -> TreeMeasures:
+    """Take trees out of the table between two years, with an event each.
+
+    Parameters
+    ----------
+    stand : Stand
+    rows : int64 array
+        Rows of the table, each once.
+    kind, cause : str
+        As in `/events`.
+    measures : TreeMeasures
+        Of all living trees.
+
+    Returns
+    -------
+    TreeMeasures
+        Of those that are left.
+    """
+    alive = np.ones(len(stand.rows.tree_id), np.bool_)
+    alive[rows] = False
+    if stand.dead_wood is not None and is_left(kind, cause):
         stand.dead_wood.leave(stand, rows.tolist(), measures)
     for row in rows.tolist():
-        stand.pending.append(Event.of(stand, row, "felled", felling.cause, measures))
+        stand.pending.append(Event.of(stand, row, kind, cause, measures))
         start, size = int(stand.rows.start[row]), int(stand.rows.size[row])
         _note_loss(stand, row, stand.arena.metamers.serial[start : start + size])
     stand.rows = table.keep(stand.rows, alive)
-    stand.treatments.note(act, felling.kind, before, after)
     left: dict[str, Any] = {name: column[alive] for name, column in measures._asdict().items()}
     return TreeMeasures(**left)
 

@@ -21,6 +21,8 @@ from forest.species.text import input_error
 from forest.trees.pruning import choose_branches, find_cuts
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from forest.growth.parameters import SpeciesTraits
     from forest.stand import Stand
 
@@ -107,6 +109,48 @@ class Hand:
         felling = doing.felling_by_hand(stand, tree_ids, cause)
         doing.fell(stand, BY_HAND, felling, stand.measure())
         return felling.tree_ids
+
+    def blow(self, speed_m_s: float, direction_deg: float = 0.0) -> list[int]:
+        """Let a storm break and uproot trees between two years.
+
+        Their events, and the rows of `/storms`, come with the next year's record.
+
+        Parameters
+        ----------
+        speed_m_s : float
+            Mean wind at the height of the canopy's top over open land, m/s.
+        direction_deg : float
+            Azimuth towards which it blows, from x towards y.
+
+        Returns
+        -------
+        list of int
+            Ids of the trees that fell.
+
+        Raises
+        ------
+        InputError
+            If there is no such storm.
+        """
+        stand = cast("Stand", self)
+        fallen = stand.storms.blow(stand, speed_m_s, direction_deg)
+        ids: list[int] = stand.rows.tree_id[fallen].tolist()
+        doing.take_out(stand, fallen, "windthrown", "wind", stand.measure())
+        return ids
+
+    def critical_wind(self, direction_deg: float = 0.0) -> pd.DataFrame:
+        """Tell the storms of a direction that the trees would not withstand; none falls.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per tree of at least `wind.from_height_m`, with the columns of `/storms` that need
+            no storm.
+        """
+        import pandas as pd
+
+        stand = cast("Stand", self)
+        return pd.DataFrame(stand.storms.critical(stand, direction_deg))
 
     def thin(self, **rule: Any) -> list[int]:
         """Thin by rule, as a scenario's act of kind `thin`: ``thin(method="below", n_ha=800)``.

@@ -134,6 +134,11 @@ class Run:
         return self._frame("treatments")
 
     @property
+    def storms(self) -> pd.DataFrame:
+        """A row per tree and storm: the winds that it does not stand, and whether it stood."""
+        return self._frame("storms")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")

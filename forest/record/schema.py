@@ -51,6 +51,9 @@ FELLING_CAUSES = ("thinning", "harvest", "tending")
 ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest")
 STAGES = ("before", "after")
 
+#: What a storm does to a tree.
+STORM_OUTCOMES = ("stood", "broken", "uprooted")
+
 #: Discs at heights that the scenario names, or where the crown begins in the year.
 RING_PLACES = ("height", "crown_base")
 
@@ -321,6 +324,28 @@ TREATMENTS = Table(
     ),
 )
 
+STORMS = Table(
+    "a tree and storm",
+    (
+        _YEAR,
+        _TREE,
+        _SPECIES,
+        Column("storm", "int16", "", "number of the storm in its year, from 1"),
+        Column("x_m", "float32", "m", "place of the stem base"),
+        Column("y_m", "float32", "m", "place of the stem base"),
+        Column("storm_m_s", "float32", "m/s", "mean wind at the canopy's top over open land"),
+        Column("direction_deg", "float32", "degrees", "azimuth towards which it blew, from x to y"),
+        _number("wind_m_s", "m/s", "mean wind at the tree's top, as exposed in the end"),
+        _number("edge", "0..1", "share in an edge's exposure: 0 within the stand, 1 at its edge"),
+        _number("critical_break_m_s", "m/s", "storm that breaks the stem, as exposed in the end"),
+        _number("critical_uproot_m_s", "m/s", "storm that uproots it, as exposed in the end"),
+        Column("outcome", "int8", "", "what the storm did", levels=STORM_OUTCOMES),
+        _count("round", "round in which it fell, from 1; 0 if it stood", "int16"),
+        _number("dbh_cm", "cm", "stem diameter over bark at 1.3 m"),
+        _number("height_m", "m", "height of the highest tip"),
+    ),
+)
+
 POPULATION = Table(
     "a year: the ledger of the living",
     (
@@ -347,6 +372,7 @@ TABLES: dict[str, Table] = {
     "climate": CLIMATE,
     "regeneration": REGENERATION,
     "treatments": TREATMENTS,
+    "storms": STORMS,
 }
 
 #: The tables that a run file may hold.

@@ -13,6 +13,7 @@ from forest.scenario.inventory import Inventory
 from forest.scenario.model import Explicit, Random, Regular
 from forest.scenario.mortality import check_mortality
 from forest.scenario.regeneration import check_regeneration
+from forest.scenario.wind import check_wind
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def check_fit(scenario: Scenario) -> None:
     shares = {name: use.share for name, use in scenario.species.items()}
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.calendar, regular)
+    check_wind(scenario)
     check_mortality(
         scenario.mortality,
         mechanics=scenario.mechanics is not None,

@@ -30,6 +30,7 @@ _TableName = Literal[
     "deadwood",
     "regeneration",
     "treatments",
+    "storms",
 ]
 
 
@@ -384,12 +385,13 @@ class Output(Table):
             "deadwood",
             "regeneration",
             "treatments",
+            "storms",
         ),
         "tables to write; stability only has rows where there is a table mechanics, deadwood "
         "where there are snags, regeneration where there is a table of that name, treatments "
-        "where there are acts",
+        "where there are acts, storms where the wind blew",
         unit="",
-        max_length=10,
+        max_length=11,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(

@@ -37,6 +37,7 @@ from forest.scenario.model import (
 )
 from forest.scenario.mortality import Mortality
 from forest.scenario.regeneration import Regeneration
+from forest.scenario.wind import Wind
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
 from forest.species.text import input_error, parse_toml, read_text, to_toml
@@ -77,6 +78,7 @@ class Scenario(Table):
     mechanics: Mechanics | None = None
     mortality: Mortality = Mortality()
     regeneration: Regeneration | None = None
+    wind: Wind | None = None
     environment: Environment
     species: dict[str, SpeciesUse] = quantity(
         ...,

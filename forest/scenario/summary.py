@@ -8,6 +8,8 @@ from forest.scenario.scenario import Scenario
 
 #: Acts that are named one by one.
 _MOST_ACTS = 6
+#: Storms that are named one by one.
+_MOST_STORMS = 6
 
 
 def summary(scenario: Scenario) -> list[tuple[str, str]]:
@@ -42,6 +44,7 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("mechanics", _mechanics(scenario)),
         ("mortality", _mortality(scenario)),
         ("regeneration", _regeneration(scenario)),
+        ("wind", _wind(scenario)),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
         ("acts", _acts(scenario)),
         ("seed", str(scenario.seed)),
@@ -89,6 +92,17 @@ def _regeneration(scenario: Scenario) -> str:
         return "none"
     rain = ", ".join(name for name, seeds in regeneration.seed_rain.items() if seeds)
     return f"trees from {regeneration.handover_height_m:g} m; seed from outside: {rain or 'none'}"
+
+
+def _wind(scenario: Scenario) -> str:
+    wind = scenario.wind
+    if wind is None:
+        return "none"
+    parts = [f"{s.year} {s.speed_m_s:g} m/s" for s in wind.storms[:_MOST_STORMS]]
+    parts += [f"{len(wind.storms) - _MOST_STORMS} more"] if len(wind.storms) > _MOST_STORMS else []
+    if wind.yearly is not None:
+        parts.append(f"every year about {wind.yearly.mode_m_s:g} m/s")
+    return ", ".join(parts) or "no storms"
 
 
 def _acts(scenario: Scenario) -> str:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from forest.errors import nearest
+from forest.species.anchorage import Anchorage
 from forest.species.curves import Curve, FactorCurve
 from forest.species.mortality import Mortality
 from forest.species.regeneration import Regeneration
@@ -389,6 +390,7 @@ SECTIONS: dict[str, type[Table]] = {
     "mortality": Mortality,
     "response": Response,
     "regeneration": Regeneration,
+    "anchorage": Anchorage,
 }
 
 
@@ -414,6 +416,7 @@ class Species(Table):
     mortality: Mortality = Mortality()
     response: Response = Response()
     regeneration: Regeneration = Regeneration()
+    anchorage: Anchorage = Anchorage()
     sources: dict[str, dict[str, str]] = Field(
         default={},
         description="where each value comes from: a table of texts per section",
