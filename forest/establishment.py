@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
 from forest.growth.shoots import sprout
+from forest.measure.trees import measure_trees
 from forest.trees import table
 from forest.yearbook import Event
 
@@ -128,7 +129,9 @@ def establish(stand: Stand, new: Newcomers, kind: str, traits: SpeciesTraits) ->
     )
     for field in stand.arena.companions:
         field[rows.start[first_row:]] = 0  # they get their rods with their first year
-    measures = stand.measure()
-    for row in range(first_row, len(rows.tree_id)):
-        stand.pending.append(Event.of(stand, row, kind, "none", measures))
+    come = table.keep(rows, np.arange(len(rows.tree_id)) >= first_row)
+    full_light = stand.surroundings.full_light
+    measures = measure_trees(stand.arena.metamers, come, stand.measured_species, full_light)
+    for k in range(len(come.tree_id)):
+        stand.pending.append(Event.of(stand, first_row + k, kind, "none", measures, k))
     return list(range(first_id, stand.next_id))

@@ -15,6 +15,7 @@ from forest.errors import ActError, InputError
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
 from forest.record.writer import RunWriter, check_target
+from forest.scenario.timing import acts_so_far
 from forest.stand import Stand
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def simulate(
     resume : bool
         Go on with an unfinished run of the same scenario, from its last checkpoint; a run without
         one starts over. A finished run is given back, and goes on if `scenario.years` has grown.
-        Acts and climate of years that are not on file may differ.
+        Acts, deaths and climate of years that are not on file may differ.
     overwrite : bool
         Replace an existing file.
     progress : bool or Observer
@@ -108,7 +109,7 @@ def simulate(
     with _threads(threads) as count, announce_compiling(compiling):
         # The stand comes before the file: if it cannot be built, the file is left as it was.
         if checkpoint is None:
-            stand = Stand(scenario)
+            stand = Stand(scenario, observer.say)
             writer = _create(scenario, out, count, command, overwrite)
         else:
             arrays, meta = checkpoint
@@ -188,8 +189,8 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
             raise InputError(
                 "was made by a different scenario",
                 where=f"--resume {out}",
-                expected="the same scenario, seed and settings; only `years` may grow, and acts "
-                "and climate of years that are not on file may differ",
+                expected="the same scenario, seed and settings; only `years` may grow, and acts, "
+                "deaths and climate of years that are not on file may differ",
             )
         if years_done > scenario.years:
             raise InputError(
@@ -201,7 +202,7 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
 
 
 def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
-    """Compare two scenarios but for their years, and for acts and climate in years not done.
+    """Compare two scenarios but for their years, and for acts, deaths and climate to come.
 
     Each may choose its sample trees in its own last year.
     """
@@ -209,7 +210,9 @@ def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
     for scenario in (one, other):
         content = scenario.model_dump()
         done = range(scenario.start_year, scenario.start_year + years_done)
-        content["acts"] = [act for act in content["acts"] if act["year"] in done]
+        content["acts"] = acts_so_far(scenario.acts, done)
+        deaths = content["mortality"]
+        deaths["events"] = [event for event in deaths["events"] if event["year"] in done]
         climate = content["climate"]
         if not climate["repeat"]:  # a series may go on
             climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forest import establishment, management
-from forest.dynamics.mortality import Death, starved
+from forest.dynamics import mortality
+from forest.dynamics.mortality import Death
 from forest.dynamics.planting import headings
+from forest.dynamics.snags import DeadWood
+from forest.dynamics.storms import Storms
 from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
@@ -21,14 +24,24 @@ from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
 from forest.growth.shoots import extend, shooting_buds
+from forest.inventory import Built, settle
 from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
+from forest.regeneration import Regeneration
+from forest.scenario.inventory import Inventory
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
 from forest.trees.metamers import Arena
-from forest.yearbook import Event, Loss, YearRecord, record_year, sample_serials
+from forest.yearbook import (
+    Event,
+    Loss,
+    YearRecord,
+    record_year,
+    sample_serials,
+    snag_columns,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,13 +50,15 @@ if TYPE_CHECKING:
     from forest.trees.skeleton import Skeleton
 
 
-class Stand:
+class Stand(management.Hand):
     """Trees that grow together in one space, driven year by year.
 
     Parameters
     ----------
     scenario : Scenario
         What to grow, and where.
+    say : callable, optional
+        Told how the nursery goes on where the stand starts from an inventory.
 
     Attributes
     ----------
@@ -67,21 +82,36 @@ class Stand:
         What bends and holds the trees, where the scenario has mechanics.
     climate : Climate
         What each year is like, and what the species make of it.
+    regeneration : Regeneration or None
+        Seeds and seedlings, where the scenario has regeneration.
     surroundings : Surroundings
         Light and space.
+    built : Built or None
+        How near the first trees are to the inventory that they were built from.
+    treatments : Treatments
+        What acts changed since the last record.
+    dead_wood : DeadWood or None
+        Snags and lying dead wood, where the scenario has snags.
     memories : dict of str to Memory
         The parts that remember something between years, for checkpoints.
     seconds : dict of str to float
         Wall time spent in each phase of the year so far.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    built: Built | None = None
+
+    def __init__(self, scenario: Scenario, say: Callable[[str], None] = lambda _: None) -> None:
         self._start(scenario)
+        if isinstance(scenario.planting, Inventory):
+            self.built = settle(self, scenario.planting, Stand, say)
+            management.check_due(self)
+            return
         first = establishment.Newcomers.planted(
             *scenario.planting_positions(), headings(*scenario.planting_leans())
         )
         establishment.establish(self, first, "planted", self._traits)
         management.check_due(self)  # what cannot be done in the first year is refused before it
+        mortality.check_due(self)
 
     def _start(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -98,12 +128,26 @@ class Stand:
         self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
         self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
-        self.memories: dict[str, Memory] = {"surroundings": self.surroundings}
+        self.treatments = management.Treatments(self)
+        self.storms = Storms(scenario, self.pipe_exponent)
+        self.memories: dict[str, Memory] = {
+            "surroundings": self.surroundings,
+            "treatments": self.treatments,
+            "storms": self.storms,
+        }
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
             plot = Plot(*scenario.plot.size_m, scenario.plot.boundary == "periodic")
             self.mechanics = Mechanics(spec, self.species, self.pipe_exponent, plot)
+        self.dead_wood: DeadWood | None = None
+        if scenario.mortality.snags:
+            self.dead_wood = DeadWood(self.species, scenario.seed)
+            self.memories["deadwood"] = self.dead_wood
+        self.regeneration: Regeneration | None = None
+        if scenario.regeneration is not None and self.surroundings.canopy is not None:
+            self.regeneration = Regeneration(scenario, self.surroundings.canopy)
+            self.memories["regeneration"] = self.regeneration
         self.arena = Arena(companions=self.mechanics.companions if self.mechanics else None)
         self.rows = table.empty()
         self._bench = Workbench()
@@ -126,7 +170,8 @@ class Stand:
         """
         self._clock = time.perf_counter()
         self.climate.check_known(self.year + 1)
-        management.act(self, self._traits.of["branch_pipe"])
+        mortality.check_due(self)
+        management.act(self, self._traits)
         self._lap("act")
         self.steps += 1
         year = self.growth_year()
@@ -144,12 +189,20 @@ class Stand:
         self._bend()
         measures, deaths = self._die()
         record = record_year(self, measures, deaths, accounts, before, rings)
+        grown = self.rows
         self._bury(deaths, measures)
         self._lap("record")
+        if self.regeneration is not None:
+            seedlings = self.regeneration.year(self, grown, measures, deaths, self._traits)
+            record.tables["regeneration"] = seedlings
+            self._lap("regenerate")
         return record
 
     def _expose(self) -> None:
-        self.surroundings.expose(self.arena.metamers, self.rows, self.steps)
+        dead = None
+        if self.dead_wood is not None:
+            dead = self.dead_wood.plant_area(self.steps, self.surroundings.voxel_m)
+        self.surroundings.expose(self.arena.metamers, self.rows, self.steps, dead)
         self._lap("expose")
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
@@ -238,9 +291,9 @@ class Stand:
             self._full_light,
             self._ring_heights,
         )
-        deaths: list[Death] = []
-        if not self._paper:
-            deaths = starved(self.rows, measures.buds, self._traits.of["suppression_years"])
+        deaths = self.storms.of_year(self, measures, mortality.deaths_of(self, measures))
+        if self.dead_wood is not None:
+            self.dead_wood.pass_year(self, deaths, measures)
         self._lap("measure")
         return measures, deaths
 
@@ -248,6 +301,7 @@ class Stand:
         remember_discs(self.rows, self.arena.metamers, measures)
         self.pending = []
         self.losses = {}
+        self.treatments.clear()
         if deaths:
             alive = np.ones(len(self.rows.tree_id), np.bool_)
             alive[[death.row for death in deaths]] = False
@@ -269,82 +323,6 @@ class Stand:
         now = time.perf_counter()
         self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._clock
         self._clock = now
-
-    # ------------------------------------------------------------------ acts between years
-
-    def plant(
-        self,
-        x: Sequence[float],
-        y: Sequence[float],
-        species: str | Sequence[str],
-        *,
-        lean_deg: float | Sequence[float] = 0.0,
-        lean_azimuth_deg: float | Sequence[float] = 0.0,
-    ) -> list[int]:
-        """Plant seedlings; they start to grow with the next step.
-
-        Parameters
-        ----------
-        x, y : sequences of float
-            Places, m, inside the plot.
-        species : str or sequence of str
-            Name or names of species of the scenario.
-        lean_deg, lean_azimuth_deg : float or sequence of float
-            Angle of the stems to the vertical, 0 to 85, and the direction towards which they lean,
-            from x to y.
-
-        Returns
-        -------
-        list of int
-            The new trees' ids.
-        """
-        return establishment.plant(self, x, y, species, lean_deg, lean_azimuth_deg, self._traits)
-
-    def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> None:
-        """Fell trees: they are gone at once, with an event in the next year's record.
-
-        Parameters
-        ----------
-        tree_ids : sequence of int
-            Living trees; one named twice is felled once.
-        cause : str
-            One of `forest.record.schema.CAUSES`.
-
-        Raises
-        ------
-        InputError
-            If there is no such tree or cause; then none is felled.
-        """
-        management.fell(self, tree_ids, cause)
-
-    def prune(
-        self, tree_id: int, metamer: int | Sequence[int] | None = None, **branches: float
-    ) -> int:
-        """Cut parts off a tree: at metamers, or the branches on its trunk that a choice names.
-
-        Parameters
-        ----------
-        tree_id : int
-            A living tree.
-        metamer : int or sequence of int, optional
-            Serial numbers of metamers: each goes with all that it carries.
-        **branches : float
-            In place of metamers, as in a scenario's acts: `below_m`, the height below which
-            branches go, m; or `side_deg`, the side to which those point that go, with or without
-            `within_deg`, `from_m`, `to_m`. See `forest.scenario.acts.Branches`.
-
-        Returns
-        -------
-        int
-            Metamers removed.
-
-        Raises
-        ------
-        InputError
-            If there is no such tree or metamer, or if the first metamer is to go: fell the tree.
-        """
-        branch_pipe = self._traits.of["branch_pipe"]
-        return management.prune(self, tree_id, metamer, branches, branch_pipe)
 
     # ------------------------------------------------------------------ what it is now
 
@@ -382,6 +360,13 @@ class Stand:
         }
         columns.update(measures.columns())
         return pd.DataFrame(columns)
+
+    @property
+    def snags(self) -> pd.DataFrame:
+        """The dead trees that stand now, a row each; none where the scenario has no snags."""
+        import pandas as pd
+
+        return pd.DataFrame(snag_columns(self))
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""

@@ -36,7 +36,9 @@ _VARIANTS = {
         'obstacles=[{ kind = "box", min_m = [0, 0, 0], max_m = [1, 1, 2] }]',
     ],
     "light, costs, mechanics": ["mechanics={wind_m_s=10, wind_growth=true}"],
+    "light, costs, storm": ["wind={storms=[{year=2002, speed_m_s=20}], from_height_m=0.1}"],
     "light, costs, stability": ["mechanics={bending=false}"],
+    "light, costs, seedlings": ["regeneration={seed_rain={generic_deciduous=50}}"],
     "light and markers": ["environment={shadow={}, canopy={}, markers={}}"],
 }
 

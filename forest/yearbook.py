@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.dynamics.mortality import Death
+from forest.dynamics.snags import Snags
 from forest.growth import budget
 from forest.measure.rings import RingYear, breast_ring_widths, ring_rows
 from forest.measure.stand import Flows, Plot, stand_rows
@@ -38,17 +39,26 @@ class Event(NamedTuple):
     volume_m3: float
 
     @classmethod
-    def of(cls, stand: Stand, row: int, kind: str, cause: str, measures: TreeMeasures) -> Event:
-        """Note an event of the tree in a row of the table."""
+    def of(
+        cls,
+        stand: Stand,
+        row: int,
+        kind: str,
+        cause: str,
+        measures: TreeMeasures,
+        place: int | None = None,
+    ) -> Event:
+        """Note an event of the tree in a row of the table, whose measures may stand elsewhere."""
+        place = row if place is None else place
         return cls(
             int(stand.rows.tree_id[row]),
             int(stand.rows.species[row]),
             kind,
             cause,
             int(stand.rows.mother_id[row]),
-            float(measures.dbh_cm[row]),
-            float(measures.height_m[row]),
-            float(measures.stem_volume_m3[row]),
+            float(measures.dbh_cm[place]),
+            float(measures.height_m[place]),
+            float(measures.stem_volume_m3[place]),
         )
 
 
@@ -79,8 +89,9 @@ class YearRecord(NamedTuple):
     year : int
         Calendar year.
     tables : dict of table to columns
-        The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`
-        and, where the scenario has mechanics, `/stability`.
+        The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`, where
+        the scenario has them `/stability`, `/deadwood` and `/regeneration`, where acts were done
+        `/treatments`, and where the wind blew `/storms`.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """
@@ -146,6 +157,15 @@ def record_year(
     }
     if stand.mechanics is not None:
         tables["stability"] = _stability_rows(stand, living)
+    if stand.dead_wood is not None:
+        hectares = plot.size_m[0] * plot.size_m[1] / _SQUARE_METRES_PER_HECTARE
+        tables["deadwood"] = stand.dead_wood.columns(stand.year, hectares)
+    treatments = stand.treatments.columns()
+    if treatments:
+        tables["treatments"] = treatments
+    blown = stand.storms.take(stand.year)
+    if blown:
+        tables["storms"] = blown
     return YearRecord(stand.year, tables, _sample_years(stand, deaths, serials_before))
 
 
@@ -194,6 +214,22 @@ def _stability_rows(stand: Stand, trees: table.Trees) -> Columns:
         "tree_id": trees.tree_id,
         "species": trees.species,
         **found._asdict(),
+    }
+
+
+def snag_columns(stand: Stand) -> Columns:
+    """Give the snags that stand now, by column."""
+    snags = Snags.none() if stand.dead_wood is None else stand.dead_wood.snags
+    return {
+        "tree_id": snags.tree_id,
+        "species": np.array([stand.species_names[k] for k in snags.species], object),
+        "x_m": snags.x,
+        "y_m": snags.y,
+        "dbh_cm": snags.dbh_cm,
+        "height_m": snags.height_m,
+        "volume_m3": snags.volume_m3,
+        "mass_kg": snags.mass_kg,
+        "death_year": stand.scenario.start_year + snags.death_step - 1,
     }
 
 

@@ -25,7 +25,7 @@ def export(
     to: Annotated[Path, typer.Option(metavar="FILE", help="File; a table's: .csv or .parquet.")],
     table: Annotated[
         str | None,
-        typer.Option(help="trees, stand, events, rings, carbon, stability or population."),
+        typer.Option(help="trees, stand, events, rings, carbon, stability, storms or population."),
     ] = None,
     tree: Annotated[int | None, typer.Option(metavar="ID", help="A sample tree's shape.")] = None,
     year: Annotated[

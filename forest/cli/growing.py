@@ -168,6 +168,9 @@ def sweep(
 def check(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     """Check a scenario and say in a few lines what it would grow.
 
+    Where it starts from an inventory, the measured trees are built to tell how near they come,
+    which takes some seconds.
+
     Examples:
 
         forest check my_stand.toml
@@ -176,7 +179,15 @@ def check(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     """
     from forest.scenario.summary import summary
 
-    print_pairs(summary(load(scenario, overrides or [])))
+    asked = load(scenario, overrides or [])
+    lines = summary(asked)
+    if asked.planting.kind == "inventory":
+        from forest.stand import Stand
+
+        built = Stand(asked).built
+        assert built is not None
+        lines.append(("inventory", built.report()))
+    print_pairs(lines)
 
 
 def _print_means(sweep: Any, plot: Path | None) -> None:

@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from forest._jit import njit
 from forest.environment.sweep import make_rays, sweep
 
+#: Leaf area indices at which `Canopy.layer_transmission` is told: so far apart, and so many.
+LAYER_STEP = 1.0 / 64.0
+_LAYER_STEPS = 1025
+
 
 class CanopyField(NamedTuple):
     """The far field as kernels take it; grids are indexed [iz, iy, ix].
@@ -83,6 +87,14 @@ def layers_above(frame: Any, iz: Any) -> Any:
     return lower, min(lower + 1, frame.top), share
 
 
+def through_layer(
+    transmission: NDArray[np.float64], lai: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Give the share of the light that a thin layer of some leaf area index lets through."""
+    steps = LAYER_STEP * np.arange(len(transmission))
+    return np.asarray(np.interp(lai, steps, transmission))
+
+
 class Canopy:
     """The far field of one stand: its grids, kept from year to year, and its rays.
 
@@ -104,6 +116,11 @@ class Canopy:
         Unit vectors towards the light.
     weights : float64 (d,)
         Their shares of the irradiance.
+
+    Attributes
+    ----------
+    layer_transmission : float64 (n,)
+        What a thin layer of leaves lets through; see `through_layer`.
     """
 
     def __init__(
@@ -122,6 +139,12 @@ class Canopy:
         self.lift = lift
         self.periodic = periodic
         self.rays = make_rays(directions, weights)
+        # what a layer of this leaf area index lets through of light from all directions alike
+        slant = 2.0 * self.rays.half.astype(np.float64)
+        depth = extinction * LAYER_STEP * np.arange(_LAYER_STEPS)
+        through = np.exp(-depth[:, None] * slant) * self.rays.weight.astype(np.float64)
+        self.layer_transmission: NDArray[np.float64] = through.sum(axis=1)
+        self._undergrowth: NDArray[np.float64] | None = None
         self._depth_per_leaf = np.float32(extinction * 1e-6 / (ratio * near_voxel_m) ** 2)
         self._plot = np.array([-(-n // ratio) for n in shape], np.int64)
         self._allocate(np.zeros(2, np.int64), self._plot, 1)
@@ -176,9 +199,36 @@ class Canopy:
         if covered is not None:
             depth += covered
         sweep(depth, self.rays, int(self.periodic), self.transmission, self.ground)
+        if self._undergrowth is not None:  # half of the layer's own leaves, as everywhere in T
+            share = through_layer(self.layer_transmission, 0.5 * self._undergrowth)
+            self._on_plot(self.transmission[0])[...] *= share.astype(np.float32)
+
+    def _on_plot(self, layer: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Cut the plot out of a layer of the grid."""
+        x, y = -self.origin
+        return layer[y : y + self._plot[1], x : x + self._plot[0]]
+
+    @property
+    def ground_light(self) -> NDArray[np.float32]:
+        """T at the ground of the plot, above its undergrowth; float32 (ny, nx) coarse voxels."""
+        return self._on_plot(self.ground)
+
+    def grow_under(self, lai: NDArray[np.float64]) -> None:
+        """Let undergrowth stand on the ground in the years to come.
+
+        It shades the lowest layer and the floor. `ground_light`, which falls on it, leaves it out,
+        so that its own leaves are counted only by what grows in it.
+
+        Parameters
+        ----------
+        lai : float64 (ny, nx)
+            Its leaf area index in the plot's coarse voxels.
+        """
+        self._undergrowth = lai
 
     def floor_light(self) -> float:
-        """Mean T at the ground of the plot, 0 to 1."""
-        x, y = -self.origin
-        plot = self.ground[y : y + self._plot[1], x : x + self._plot[0]]
-        return float(plot.mean(dtype=np.float64))
+        """Mean T on the plot's floor, below all that grows there, 0 to 1."""
+        if self._undergrowth is None:
+            return float(self.ground_light.mean(dtype=np.float64))
+        share = through_layer(self.layer_transmission, self._undergrowth)
+        return float((self.ground_light * share).mean(dtype=np.float64))

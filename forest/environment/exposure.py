@@ -13,6 +13,7 @@ from forest.environment.canopy import Canopy, CanopyField
 from forest.environment.directions import make_perception, preferred_directions
 from forest.environment.light_grid import UNIT, ShadowField, ShadowGrid, propagate
 from forest.environment.obstacles import Box, Mesh, Solid, coarse_depth, solid_voxels, voxelise
+from forest.environment.plant_area import PlantArea
 from forest.environment.site_light import (
     SLABS,
     Plot,
@@ -193,8 +194,11 @@ class Light:
             weights=weights,
         )
 
-    def expose(self, metamers: Metamers, trees: Trees) -> None:
-        """Rebuild both fields from the living buds and set `metamers.light` of every node."""
+    def expose(self, metamers: Metamers, trees: Trees, others: PlantArea | None = None) -> None:
+        """Rebuild both fields from the living buds and set `metamers.light` of every node.
+
+        `others` shades in the far field alone.
+        """
         blocks = deal_blocks(trees)
         bounds = bound_blocks(metamers, trees, blocks, self._voxel_m)
         occupied = bounds[bounds[:, 0] <= bounds[:, 1]]
@@ -203,9 +207,11 @@ class Light:
         )
         high = occupied[:, 1::2].max(axis=0, initial=-(2**40)) if len(occupied) else 0 * low
         near = self._clear_near(low, high)
-        far = self._clear_far(low, high)
+        far = self._clear_far(low, high, others)
         plot = self._cut_slabs(low, high, max(far.ratio, 1))
         deposit(metamers, trees, blocks, bounds, plot, near, far, self._units)
+        if others is not None:
+            others.add_to(far, self._shape)
         if self._grid:
             propagate(near)
         if self._canopy:
@@ -227,12 +233,17 @@ class Light:
             self._grid.counts[z, y, x] = self._solid_count
         return self._grid.field
 
-    def _clear_far(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> CanopyField:
+    def _clear_far(
+        self, low: NDArray[np.int64], high: NDArray[np.int64], others: PlantArea | None
+    ) -> CanopyField:
         if self._canopy is None:
             return no_canopy()
         if len(self._solid_voxels):
             low = np.minimum(low, self._solid_voxels.min(axis=0))
             high = np.maximum(high, self._solid_voxels.max(axis=0))
+        if others is not None and len(others.voxel):
+            low = np.minimum(low, others.voxel.min(axis=0))
+            high = np.maximum(high, others.voxel.max(axis=0))
         self._canopy.clear(low, high)
         return self._canopy.field
 
@@ -265,6 +276,11 @@ class Light:
             self._voxel_m,
             mode=self._mode,
         )
+
+    @property
+    def canopy(self) -> Canopy | None:
+        """The far field."""
+        return self._canopy
 
     def floor_light(self) -> float:
         """Mean relative irradiance at the ground of the plot, 0 to 1; NaN without a far field."""

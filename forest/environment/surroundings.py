@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.environment.canopy import Canopy
 from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
 from forest.environment.marker_buds import BudSpace, apply_space
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
 from forest.environment.obstacles import Box, Mesh, Solid
+from forest.environment.plant_area import PlantArea
 from forest.environment.rendered_kernels import Looks
 from forest.environment.rendered_light import RenderedLight, RenderedSpec
 from forest.trees.buds import Shoots
@@ -115,12 +117,22 @@ class Surroundings:
         """The voxels that obstacles fill."""
         return self._light.solid
 
-    def expose(self, metamers: Metamers, trees: Trees, step: int) -> None:
-        """Tell every bud how much light and room it has in the given step."""
+    def expose(
+        self, metamers: Metamers, trees: Trees, step: int, others: PlantArea | None = None
+    ) -> None:
+        """Tell every bud how much light and room it has in the given step.
+
+        Parameters
+        ----------
+        metamers, trees : Metamers, Trees
+        step : int
+        others : PlantArea, optional
+            What shades beside living trees, in the far field.
+        """
         if self._rendered is not None:
             self._rendered.expose(metamers, trees, step)
         else:
-            self._light.expose(metamers, trees)
+            self._light.expose(metamers, trees, others)
         if self._markers is not None:
             space = self._markers.claim(metamers, trees, self._marker_species)
             apply_space(metamers, trees, space)
@@ -135,6 +147,11 @@ class Surroundings:
         serial = metamers.serial[trees.start[row] + shoots.metamer]
         wanted = _key(trees.tree_id[row], serial, shoots.bud)
         return direction[np.searchsorted(keys, wanted)]
+
+    @property
+    def canopy(self) -> Canopy | None:
+        """The far field, where the scenario has one."""
+        return self._light.canopy
 
     def floor_light(self) -> float:
         """Mean relative irradiance at the ground, 0..1; NaN without a far field."""

@@ -82,7 +82,7 @@ class Mechanics:
         self._plot = plot
         self._woods = wood_traits(species, pipe_exponent)
         self._load_species = LoadSpecies.of(species, pipe_exponent)
-        self._stems = _stem_species(species, pipe_exponent)
+        self._stems = stem_species(species, pipe_exponent)
         share = np.array([s.mechanics.wind_stress_limit for s in species], np.float64)
         self._wind_limit = share * self._stems.rupture
         self._wind_need = np.zeros(0, np.float32)
@@ -242,7 +242,9 @@ def _tropism(species: Sequence[Species]) -> tuple[NDArray[np.float64], NDArray[n
     return tropism, stiffness
 
 
-def _stem_species(species: Sequence[Species], pipe_exponent: NDArray[np.float64]) -> StemSpecies:
+def stem_species(species: Sequence[Species], pipe_exponent: NDArray[np.float64]) -> StemSpecies:
+    """Read what statics must know of the species; the exponent is that of the run."""
+
     def each(key: str, scale: float = 1.0) -> NDArray[np.float64]:
         return np.array([scale * getattr(s.mechanics, key) for s in species], np.float64)
 

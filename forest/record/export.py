@@ -113,6 +113,7 @@ def info(run: Run) -> list[tuple[str, str]]:
         ("years", _span(run)),
         ("species", ", ".join(run.species_names)),
         ("tables", ", ".join(f"{name} ({run.count(name):,})" for name in run.tables)),
+        ("trees", _fates(run)),
         ("sample trees", ", ".join(map(str, run.samples)) or "none"),
         ("scenario", f"sha256 {provenance['scenario_sha256']}"),
         ("seed", str(provenance["seed"])),
@@ -127,6 +128,26 @@ def info(run: Run) -> list[tuple[str, str]]:
     if last["peak_memory_bytes"]:
         lines.append(("memory", f"{_size(last['peak_memory_bytes'])} at most"))
     return lines
+
+
+def _fates(run: Run) -> str:
+    """Sum up what became of the trees, by cause where the events are on file."""
+    if not len(run.years):
+        return "none yet"
+    if "events" in run.tables:
+        ledger = run.ledger
+        totals = ledger.drop(columns=["living_before", "living"]).sum()
+    else:
+        ledger = run.population
+        totals = ledger.drop(columns=["year", "living_before", "living"]).sum()
+    parts = [f"{n:,} {_words(str(name))}" for name, n in totals.items() if n]
+    return ", ".join([*parts, f"{int(ledger['living'].iloc[-1]):,} living"])
+
+
+def _words(column: str) -> str:
+    """Write a column of the ledger as words: died_no_buds is died (no buds)."""
+    kind, _, cause = column.partition("_")
+    return f"{kind} ({cause.replace('_', ' ')})" if cause else kind
 
 
 def _span(run: Run) -> str:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.record.schema import EVENT_KINDS, STATUS
+from forest.record.schema import DEATH_CAUSES, EVENT_KINDS, FELLING_CAUSES, STATUS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Columns = Mapping[str, NDArray[Any]]
 
 #: Largest allowed gap of the carbon ledger, relative to its largest entry.
 CARBON_TOLERANCE = 1e-6
 
+_CAME = ("planted", "recruited")
 _SPENT = ("leaves", "upkeep", "extension", "ring", "reserve_change")
 
 
@@ -60,6 +64,58 @@ def population_row(
     row = {"year": year, "living_before": living_before, **count, "living": living}
     del row["pruned"]
     return {name: np.array([value], np.int32) for name, value in row.items()}
+
+
+def by_cause(population: pd.DataFrame, events: pd.DataFrame) -> pd.DataFrame:
+    """Set up the ledger of the living with a column for each cause of death and of felling.
+
+    Parameters
+    ----------
+    population, events : DataFrame
+        The whole tables of a run.
+
+    Returns
+    -------
+    DataFrame
+        A row per year, its index: `living_before`, `planted`, `recruited`, `died_<cause>` for
+        each of `DEATH_CAUSES`, `felled_<cause>` for each of `FELLING_CAUSES`, `windthrown` and
+        `living`, and columns for whatever else the events name.
+
+    Raises
+    ------
+    LedgerError
+        If the events of a year do not lead from `living_before` to `living`, or a year does not
+        begin with the trees with which the one before ended.
+    """
+    known = (
+        *_CAME,
+        *(f"died_{cause}" for cause in DEATH_CAUSES),
+        *(f"felled_{cause}" for cause in FELLING_CAUSES),
+        "windthrown",
+    )
+    kinds, causes = events["kind"].astype(str), events["cause"].astype(str)
+    names = kinds.where(~kinds.isin(("died", "felled")), kinds + "_" + causes)
+    further = sorted(set(names) - {*known, "pruned"})
+    years = population["year"].to_numpy()
+    ledger = population.set_index("year")[["living_before"]].astype(np.int64)
+    for name in (*known, *further):
+        place = np.searchsorted(years, events["year"].to_numpy()[(names == name).to_numpy()])
+        ledger[name] = np.bincount(place, minlength=len(years))
+    ledger["living"] = population["living"].to_numpy(np.int64)
+    _check_causes(ledger)
+    return ledger
+
+
+def _check_causes(ledger: pd.DataFrame) -> None:
+    """Check that each year's columns lead to its living trees, and begin with those before."""
+    columns = {str(name): column.to_numpy() for name, column in ledger.items()}
+    before, living = columns.pop("living_before"), columns.pop("living")
+    change = sum(n if name in _CAME else -n for name, n in columns.items())
+    wrong = before + change != living
+    wrong[1:] |= before[1:] != living[:-1]
+    if wrong.any():
+        year = ledger.index[int(np.flatnonzero(wrong)[0])]
+        raise LedgerError(f"the events of {year} do not account for its living trees")
 
 
 def check_carbon(year: int, carbon: Columns) -> None:

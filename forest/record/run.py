@@ -124,9 +124,39 @@ class Run:
         return self._frame("climate")
 
     @property
+    def regeneration(self) -> pd.DataFrame:
+        """A row per year and species, where the scenario has regeneration: seeds and seedlings."""
+        return self._frame("regeneration")
+
+    @property
+    def treatments(self) -> pd.DataFrame:
+        """The stand before and after each act: the columns of `stand`, as the acts left it."""
+        return self._frame("treatments")
+
+    @property
+    def storms(self) -> pd.DataFrame:
+        """A row per tree and storm: the winds that it does not stand, and whether it stood."""
+        return self._frame("storms")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")
+
+    @property
+    def deadwood(self) -> pd.DataFrame:
+        """A row per year and species, and one for all, where the scenario has snags."""
+        return self._frame("deadwood")
+
+    @cached_property
+    def ledger(self) -> pd.DataFrame:
+        """A row per year: who came, and who went by which cause; `events` must be on file.
+
+        See `forest.record.ledger.by_cause`, which checks that it balances.
+        """
+        from forest.record.ledger import by_cause
+
+        return by_cause(self.population, self.events)
 
     def read(
         self,

@@ -24,7 +24,35 @@ CAUSES = (
     "thinning",
     "harvest",
     "no_buds",
+    "fire",
+    "insects",
+    "disease",
+    "browsing",
+    "drought",
+    "other",
+    "tending",
 )
+
+#: What trees die of where they stand, and why trees are felled: columns of `Run.ledger`.
+DEATH_CAUSES = (
+    "suppression",
+    "no_buds",
+    "age",
+    "background",
+    "buckling",
+    "fire",
+    "insects",
+    "disease",
+    "browsing",
+    "drought",
+    "other",
+)
+FELLING_CAUSES = ("thinning", "harvest", "tending")
+ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest")
+STAGES = ("before", "after")
+
+#: What a storm does to a tree.
+STORM_OUTCOMES = ("stood", "broken", "uprooted")
 
 #: Discs at heights that the scenario names, or where the crown begins in the year.
 RING_PLACES = ("height", "crown_base")
@@ -226,6 +254,30 @@ STABILITY = Table(
     ),
 )
 
+_WOOD_OF = "of the stems, less what has decayed"
+_MASS_OF = "of stems and branches, less what has decayed"
+
+DEADWOOD = Table(
+    "a year and species, and one for all species, where the scenario has snags",
+    (
+        _YEAR,
+        _SPECIES_OR_ALL,
+        _stand("snags_ha", "1/ha", "dead trees that stand"),
+        _stand("new_snags_ha", "1/ha", "trees that died in the year and stand"),
+        _stand("fallen_snags_ha", "1/ha", "snags that fell in the year"),
+        _stand("standing_m3ha", "m3/ha", f"snags: volume {_WOOD_OF}"),
+        _stand("lying_m3ha", "m3/ha", f"lying dead wood: volume {_WOOD_OF}"),
+        _stand("input_m3ha", "m3/ha", "volume of the trees that died in the year"),
+        _stand("fallen_m3ha", "m3/ha", "what came from standing to lying in the year"),
+        _stand("decayed_m3ha", "m3/ha", "what decayed in the year"),
+        _stand("standing_tha", "t/ha dry mass", f"snags: mass {_MASS_OF}"),
+        _stand("lying_tha", "t/ha dry mass", f"lying dead wood: mass {_MASS_OF}"),
+        _stand("input_tha", "t/ha dry mass", "mass of the trees that died in the year"),
+        _stand("fallen_tha", "t/ha dry mass", "what came from standing to lying in the year"),
+        _stand("decayed_tha", "t/ha dry mass", "what decayed in the year"),
+    ),
+)
+
 CLIMATE = Table(
     "a year and species: the year's climate, and what the species makes of it",
     (
@@ -236,6 +288,61 @@ CLIMATE = Table(
         _number("drought_index", "", "drought index; below 0 dry", dtype="float64"),
         Column("growth_index", "float64", "", "factor on the income of all species"),
         Column("factor", "float64", "", "factor on the species' income, growth index included"),
+    ),
+)
+
+REGENERATION = Table(
+    "a year and species, where the scenario has regeneration",
+    (
+        _YEAR,
+        _SPECIES,
+        _stand("mast", "", "factor of the year on the species' seeds; 1 in the mean"),
+        _stand("seeds_ha", "1/ha", "viable seeds that are expected to fall"),
+        _stand("germinated_ha", "1/ha", "seedlings that outlived their first summer"),
+        _stand("sprouts_ha", "1/ha", "sprouts from stumps"),
+        _stand("died_ha", "1/ha", "older seedlings that died in the year's light"),
+        _stand("crowded_ha", "1/ha", "seedlings that found no room"),
+        _stand("recruits_ha", "1/ha", "seedlings that became trees; their events are next year's"),
+        _stand("n_ha", "1/ha", "seedlings at the end of the year"),
+        _stand("n_low_ha", "1/ha", "those below 0.1 m"),
+        _stand("n_high_ha", "1/ha", "those of 0.5 m and more"),
+        _stand("mean_height_m", "m", "their mean height"),
+        _stand("lai", "m2/m2", "their leaf area index, one-sided"),
+        _stand("reserve_kg_ha", "kg dry mass/ha", "what they have stored"),
+    ),
+)
+
+TREATMENTS = Table(
+    "a treatment (an act that was done), before and after it, and species, and one for all species",
+    (
+        Column("year", "int32", "calendar year", "the year before whose growth it was done"),
+        _count("number", "of the treatment in its year, from 1, in the order in which it was done"),
+        _count("act", "of the act in the scenario's list, from 0; -1 if done by hand"),
+        Column("kind", "int8", "", "kind of act", levels=ACT_KINDS),
+        Column("stage", "int8", "", "before or after it", levels=STAGES),
+        *STAND.columns[1:],
+    ),
+)
+
+STORMS = Table(
+    "a tree and storm",
+    (
+        _YEAR,
+        _TREE,
+        _SPECIES,
+        Column("storm", "int16", "", "number of the storm in its year, from 1"),
+        Column("x_m", "float32", "m", "place of the stem base"),
+        Column("y_m", "float32", "m", "place of the stem base"),
+        Column("storm_m_s", "float32", "m/s", "mean wind at the canopy's top over open land"),
+        Column("direction_deg", "float32", "degrees", "azimuth towards which it blew, from x to y"),
+        _number("wind_m_s", "m/s", "mean wind at the tree's top, as exposed in the end"),
+        _number("edge", "0..1", "share in an edge's exposure: 0 within the stand, 1 at its edge"),
+        _number("critical_break_m_s", "m/s", "storm that breaks the stem, as exposed in the end"),
+        _number("critical_uproot_m_s", "m/s", "storm that uproots it, as exposed in the end"),
+        Column("outcome", "int8", "", "what the storm did", levels=STORM_OUTCOMES),
+        _count("round", "round in which it fell, from 1; 0 if it stood", "int16"),
+        _number("dbh_cm", "cm", "stem diameter over bark at 1.3 m"),
+        _number("height_m", "m", "height of the highest tip"),
     ),
 )
 
@@ -261,7 +368,11 @@ TABLES: dict[str, Table] = {
     "rings": RINGS,
     "carbon": CARBON,
     "stability": STABILITY,
+    "deadwood": DEADWOOD,
     "climate": CLIMATE,
+    "regeneration": REGENERATION,
+    "treatments": TREATMENTS,
+    "storms": STORMS,
 }
 
 #: The tables that a run file may hold.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,12 +26,14 @@ if TYPE_CHECKING:
 
     from forest.record.run import Run
 
+_BREAST_HEIGHT_MM = 1300
+
 
 def disc(run: Run, tree_id: int, height_m: float, year: int | None) -> Disc:
     """Cut a disc; see `Run.disc`."""
     if tree_id in run.samples:
         life = stem_life(run, tree_id, year)
-        return life.disc(height_m, _recorded_rings(run, tree_id, height_m, int(life.years[-1])))
+        return life.disc(height_m, _recorded_rings(run, life, height_m))
     rings = _rings(run, tree_id, height_m, year)
     return Disc.of(rings, _bark_factor(run, rings.species))
 
@@ -164,7 +167,7 @@ def _rings(run: Run, tree_id: int, height_m: float, year: int | None) -> StemRin
     _check_years(run, year)
     if tree_id in run.samples:
         life = stem_life(run, tree_id, year)
-        found = _recorded_rings(run, tree_id, height_m, int(life.years[-1]))
+        found = _recorded_rings(run, life, height_m)
         return life.rings(height_m) if found is None else found
     if "rings" not in run.tables:
         raise InputError(
@@ -181,18 +184,38 @@ def _rings(run: Run, tree_id: int, height_m: float, year: int | None) -> StemRin
             where=str(run.path),
             expected=f"a year from {rings['year'].min()} to {last}",
         )
-    return rings_at(upto, tree_id, height_m)
+    found = rings_at(upto, tree_id, height_m)
+    radius_m = _breast_radius(run, found) if found.cambial_age[0] > 1 else math.nan
+    return found if math.isnan(radius_m) else _around_old_wood(found, radius_m)
 
 
-def _recorded_rings(run: Run, tree_id: int, height_m: float, year: int) -> StemRings | None:
-    """Take a tree's rings out of the table rings; None if it has none of that height and year."""
+def _recorded_rings(run: Run, life: StemLife, height_m: float) -> StemRings | None:
+    """Take a sample tree's rings out of the table rings; None if it has none of that height."""
     if "rings" not in run.tables:
         return None
-    rings = _of_tree(run, tree_id)
+    rings, year = _of_tree(run, life.tree_id), int(life.years[-1])
     here = rings[at_height(rings, height_m) & (rings["year"] <= year).to_numpy()]
     if not len(here) or int(here["year"].max()) != year:
         return None
-    return rings_at(here, tree_id, height_m)
+    found = rings_at(here, life.tree_id, height_m)
+    return _around_old_wood(found, life.radius[-1, life.internode_at(height_m)])
+
+
+def _around_old_wood(rings: StemRings, radius_m: float) -> StemRings:
+    """Tell the wood inside the first ring of a tree that came into the run with rings behind it."""
+    if rings.cambial_age[0] == 1:
+        return rings
+    return rings._replace(undated_mm=max(1000.0 * radius_m - float(rings.width_mm.sum()), 0.0))
+
+
+def _breast_radius(run: Run, rings: StemRings) -> float:
+    """Give a tree's radius under bark at 1.3 m in the year of its last ring, m; NaN if not told."""
+    if "trees" not in run.tables or round(1000.0 * rings.stem_height_m) != _BREAST_HEIGHT_MM:
+        return float("nan")
+    last = int(rings.year[-1])
+    trees = run.read("trees", ["tree_id", "dbh_cm"], years=(last, last))
+    (dbh_cm,) = trees.loc[trees["tree_id"] == rings.tree_id, "dbh_cm"]
+    return 0.005 * float(dbh_cm) * (1.0 - _bark_factor(run, rings.species))
 
 
 def _of_tree(run: Run, tree_id: int) -> pd.DataFrame:

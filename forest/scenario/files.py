@@ -92,6 +92,11 @@ def _number(
     return value
 
 
+def read_rows(file: str, context: Any) -> list[tuple[int, dict[str, str]]]:
+    """Read the line number and the cells, by column, of every row of a CSV file."""
+    return list(_rows(file, context, ()))
+
+
 def read_stem_map(
     file: str, default_species: str, context: Any
 ) -> list[tuple[int, float, float, str]]:
@@ -100,6 +105,29 @@ def read_stem_map(
     for line, row in _rows(file, context, ("x_m", "y_m")):
         x, y = (_number(file, line, row, column) for column in ("x_m", "y_m"))
         trees.append((line, x, y, row.get("species") or default_species))
+    if not trees:
+        raise Refusal(f"{file!r} holds no tree", expected="at least one row")
+    return trees
+
+
+def read_inventory(file: str, numbers: tuple[str, ...], context: Any) -> list[dict[str, Any]]:
+    """Read the trees of an inventory; an empty cell is left out, and so is a dbh of 0.
+
+    `numbers` are the columns that may be missing or empty; `age` is a whole number.
+    """
+    trees = []
+    for line, row in _rows(file, context, ("x_m", "y_m")):
+        tree: dict[str, Any] = {"line": line, "species": row.get("species", "")}
+        for column in ("x_m", "y_m"):
+            tree[column] = _number(file, line, row, column)
+        for column in numbers:
+            if row.get(column):
+                tree[column] = _number(file, line, row, column)
+        if tree.get("dbh_cm") == 0.0:
+            del tree["dbh_cm"]
+        if "age" in tree and tree["age"].is_integer():
+            tree["age"] = int(tree["age"])
+        trees.append(tree)
     if not trees:
         raise Refusal(f"{file!r} holds no tree", expected="at least one row")
     return trees

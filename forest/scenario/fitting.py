@@ -9,7 +9,11 @@ from forest.scenario import placing
 from forest.scenario.acts import check_acts
 from forest.scenario.climate import check_covered
 from forest.scenario.complete import check_spots
+from forest.scenario.inventory import Inventory
 from forest.scenario.model import Explicit, Random, Regular
+from forest.scenario.mortality import check_mortality
+from forest.scenario.regeneration import check_regeneration
+from forest.scenario.wind import check_wind
 from forest.species.schema import Refusal
 
 if TYPE_CHECKING:
@@ -28,7 +32,24 @@ def check_fit(scenario: Scenario) -> None:
     _grid_fits(scenario)
     _trees_fit(scenario)
     check_covered(scenario.climate, scenario.calendar)
-    check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
+    check_regeneration(
+        scenario.regeneration,
+        mode=scenario.mode,
+        environment=scenario.environment,
+        species=scenario.species,
+        planted=not isinstance(scenario.planting, Explicit) or bool(scenario.planting.trees),
+    )
+    shares = {name: use.share for name, use in scenario.species.items()}
+    regular = isinstance(scenario.planting, Regular)
+    check_acts(scenario.acts, scenario.plot, shares, scenario.calendar, regular)
+    check_wind(scenario)
+    check_mortality(
+        scenario.mortality,
+        mechanics=scenario.mechanics is not None,
+        plot=scenario.plot,
+        species=scenario.species,
+        years=scenario.calendar,
+    )
 
 
 def _wind_has_a_price(scenario: Scenario) -> None:
@@ -90,6 +111,8 @@ def _trees_fit(scenario: Scenario) -> None:
     planting, size = scenario.planting, scenario.plot.size_m
     if isinstance(planting, Explicit):
         _check_trees(scenario, planting)
+    elif isinstance(planting, Inventory):
+        return  # its trees were checked when they were read
     elif not any(use.share > 0 for use in scenario.species.values()):
         raise Refusal("every share is 0", key="species", expected="a share above 0")
     elif isinstance(planting, Random):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from forest.scenario import files
+from forest.scenario.inventory import Inventory
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, quantity
 
@@ -18,7 +19,19 @@ _Extent = Annotated[float, Field(gt=0, le=1e5)]
 _DiscHeight = Annotated[float, Field(gt=0, le=150)]
 _Quantile = Annotated[float, Field(ge=0, le=1)]
 _Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
-_TableName = Literal["trees", "stand", "events", "rings", "carbon", "stability", "climate"]
+_TableName = Literal[
+    "trees",
+    "stand",
+    "events",
+    "rings",
+    "carbon",
+    "stability",
+    "climate",
+    "deadwood",
+    "regeneration",
+    "treatments",
+    "storms",
+]
 
 
 class Plot(Table):
@@ -258,7 +271,10 @@ class Explicit(Table):
 
     kind: Literal["explicit"] = quantity("explicit", "kind of planting", unit="")
     trees: tuple[PlantedTree, ...] = quantity(
-        ..., "the trees", unit="", min_length=1, max_length=1_000_000
+        ...,
+        "the trees; none = bare ground, where a table regeneration brings seeds",
+        unit="",
+        max_length=1_000_000,
     )
 
 
@@ -289,7 +305,7 @@ class Random(Table):
     )
 
 
-Planting = Annotated[Explicit | StemMap | Regular | Random, Field(discriminator="kind")]
+Planting = Annotated[Explicit | StemMap | Regular | Random | Inventory, Field(discriminator="kind")]
 
 
 class Box(Table):
@@ -358,10 +374,24 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        ("trees", "stand", "events", "rings", "carbon", "stability", "climate"),
-        "tables to write; stability only has rows where there is a table mechanics",
+        (
+            "trees",
+            "stand",
+            "events",
+            "rings",
+            "carbon",
+            "stability",
+            "climate",
+            "deadwood",
+            "regeneration",
+            "treatments",
+            "storms",
+        ),
+        "tables to write; stability only has rows where there is a table mechanics, deadwood "
+        "where there are snags, regeneration where there is a table of that name, treatments "
+        "where there are acts, storms where the wind blew",
         unit="",
-        max_length=7,
+        max_length=11,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(

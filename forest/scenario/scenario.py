@@ -18,6 +18,8 @@ from forest.scenario.acts import Act
 from forest.scenario.climate import Climate, embed_file
 from forest.scenario.complete import complete, embed_stem_map
 from forest.scenario.fitting import check_fit
+from forest.scenario.inventory import Inventory, inventory_places
+from forest.scenario.inventory_file import embed_inventory
 from forest.scenario.model import (
     Environment,
     Explicit,
@@ -33,6 +35,9 @@ from forest.scenario.model import (
     SpeciesUse,
     StemMap,
 )
+from forest.scenario.mortality import Mortality
+from forest.scenario.regeneration import Regeneration
+from forest.scenario.wind import Wind
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
 from forest.species.text import input_error, parse_toml, read_text, to_toml
@@ -71,6 +76,9 @@ class Scenario(Table):
     climate: Climate = Climate()
     growth: Growth = Growth()
     mechanics: Mechanics | None = None
+    mortality: Mortality = Mortality()
+    regeneration: Regeneration | None = None
+    wind: Wind | None = None
     environment: Environment
     species: dict[str, SpeciesUse] = quantity(
         ...,
@@ -84,7 +92,10 @@ class Scenario(Table):
         (), "what blocks growth and casts shade", unit="", max_length=10000
     )
     acts: tuple[Act, ...] = quantity(
-        (), "what is pruned, felled and planted between years", unit="", max_length=100_000
+        (),
+        "what is pruned, thinned, harvested and planted between years",
+        unit="",
+        max_length=100_000,
     )
     output: Output = Output()
 
@@ -160,6 +171,8 @@ class Scenario(Table):
     def _read_stem_map(cls, planting: Planting, info: ValidationInfo) -> Planting:
         if isinstance(planting, StemMap):
             return embed_stem_map(planting, info)
+        if isinstance(planting, Inventory):
+            return embed_inventory(planting, info)
         return planting
 
     @model_validator(mode="after")
@@ -201,7 +214,7 @@ class Scenario(Table):
 
     def _count_trees(self) -> int:
         planting, size = self.planting, self.plot.size_m
-        if isinstance(planting, Explicit):
+        if isinstance(planting, Explicit | Inventory):
             return len(planting.trees)
         if isinstance(planting, Random):
             return placing.random_count(size, planting.density_ha, planting.min_distance_m)
@@ -248,6 +261,9 @@ class Scenario(Table):
                 x, y = x % size[0], y % size[1]
             index = [names.index(tree.species) if tree.species else 0 for tree in planting.trees]
             return x, y, np.array(index, dtype=np.int64)
+        if isinstance(planting, Inventory):
+            x, y, kind = inventory_places(planting.trees, list(self.species))
+            return (x % size[0], y % size[1], kind) if periodic else (x, y, kind)
         if isinstance(planting, Regular):
             x, y = placing.regular_spots(size, planting.spacing_m)
         elif isinstance(planting, Random):

@@ -8,6 +8,8 @@ from forest.scenario.scenario import Scenario
 
 #: Acts that are named one by one.
 _MOST_ACTS = 6
+#: Storms that are named one by one.
+_MOST_STORMS = 6
 
 
 def summary(scenario: Scenario) -> list[tuple[str, str]]:
@@ -33,13 +35,16 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
     return [
         ("title", scenario.title or "(none)"),
         ("plot", f"{width:g} x {depth:g} m, {scenario.plot.boundary}"),
-        ("trees", f"{trees} ({len(kind) / (width * depth) * 1e4:,.0f} per ha)"),
+        ("trees", f"{trees or 'none'} ({len(kind) / (width * depth) * 1e4:,.0f} per ha)"),
         ("years", f"{scenario.years} ({scenario.start_year} to {last})"),
         ("mode", scenario.mode),
         ("climate", _climate(scenario)),
         ("environment", " + ".join(parts)),
         ("bud fate", scenario.growth.bud_fate),
         ("mechanics", _mechanics(scenario)),
+        ("mortality", _mortality(scenario)),
+        ("regeneration", _regeneration(scenario)),
+        ("wind", _wind(scenario)),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
         ("acts", _acts(scenario)),
         ("seed", str(scenario.seed)),
@@ -71,10 +76,39 @@ def _mechanics(scenario: Scenario) -> str:
     return f"{how}, wind {mechanics.wind_m_s:g} m/s{answered}"
 
 
+def _mortality(scenario: Scenario) -> str:
+    mortality = scenario.mortality
+    causes = [key for key in ("age", "background", "buckling") if getattr(mortality, key)]
+    if mortality.events:
+        causes.append(f"{len(mortality.events)} disturbances")
+    kept = "; snags and dead wood" if mortality.snags else ""
+    paper = scenario.mode == "paper"
+    return (", ".join([*([] if paper else ["suppression"]), *causes]) or "none") + kept
+
+
+def _regeneration(scenario: Scenario) -> str:
+    regeneration = scenario.regeneration
+    if regeneration is None:
+        return "none"
+    rain = ", ".join(name for name, seeds in regeneration.seed_rain.items() if seeds)
+    return f"trees from {regeneration.handover_height_m:g} m; seed from outside: {rain or 'none'}"
+
+
+def _wind(scenario: Scenario) -> str:
+    wind = scenario.wind
+    if wind is None:
+        return "none"
+    parts = [f"{s.year} {s.speed_m_s:g} m/s" for s in wind.storms[:_MOST_STORMS]]
+    parts += [f"{len(wind.storms) - _MOST_STORMS} more"] if len(wind.storms) > _MOST_STORMS else []
+    if wind.yearly is not None:
+        parts.append(f"every year about {wind.yearly.mode_m_s:g} m/s")
+    return ", ".join(parts) or "no storms"
+
+
 def _acts(scenario: Scenario) -> str:
-    """Name the acts in the order of their years, or the first and last of many."""
-    acts = sorted(scenario.acts, key=lambda act: act.year)
-    named = [f"{act.kind} in {act.year}" for act in acts]
+    """Name the acts in the order of their first years, or the first and last of many."""
+    acts = sorted(scenario.acts, key=lambda act: act.calendar_years(scenario.calendar)[0])
+    named = [f"{act.in_words} {act.time_in_words}" for act in acts]
     if len(named) > _MOST_ACTS:
         named[_MOST_ACTS - 1 : -1] = [f"... ({len(acts)} in all)"]
     return ", ".join(named) or "none"

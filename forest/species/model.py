@@ -10,7 +10,10 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from forest.errors import nearest
+from forest.species.anchorage import Anchorage
 from forest.species.curves import Curve, FactorCurve
+from forest.species.mortality import Mortality
+from forest.species.regeneration import Regeneration
 from forest.species.response import Response
 from forest.species.schema import Refusal, Table, quantity
 
@@ -364,6 +367,13 @@ class Mensuration(Table):
         7.0, "diameter over bark down to which a stem is merchantable", unit="cm", ge=0, le=100
     )
     stump_height_m: float = quantity(0.3, "height of the stump", unit="m", ge=0, le=2)
+    max_sdi: float = quantity(
+        900.0,
+        "stand density index (Reineke) of the densest pure stands",
+        unit="1/ha",
+        ge=100,
+        le=5000,
+    )
 
 
 SECTIONS: dict[str, type[Table]] = {
@@ -377,7 +387,10 @@ SECTIONS: dict[str, type[Table]] = {
     "balance": Balance,
     "mechanics": Mechanics,
     "mensuration": Mensuration,
+    "mortality": Mortality,
     "response": Response,
+    "regeneration": Regeneration,
+    "anchorage": Anchorage,
 }
 
 
@@ -400,7 +413,10 @@ class Species(Table):
     balance: Balance = Balance()
     mechanics: Mechanics = Mechanics()
     mensuration: Mensuration = Mensuration()
+    mortality: Mortality = Mortality()
     response: Response = Response()
+    regeneration: Regeneration = Regeneration()
+    anchorage: Anchorage = Anchorage()
     sources: dict[str, dict[str, str]] = Field(
         default={},
         description="where each value comes from: a table of texts per section",

@@ -1,0 +1,1 @@
+"""How a stand renews itself: seeds, cohorts of seedlings, recruits and sprouts."""
