@@ -73,7 +73,7 @@ def against_targets(goal: Goal, tables: Sequence[pd.DataFrame]) -> str:
                 _NAMES[target.column],
                 f"{sign}{target.value:.4g}",
                 f"{mean:.4g}",
-                f"{found.std(ddof=1):.2g}",
+                f"{found.std(ddof=1):.2g}" if np.ptp(found) > 1e-9 else "0",
                 f"{off_percent(mean, target):+.0f} %",
                 f"{100 * target.tolerance:.0f} %",
                 "yes" if within(mean, target) else "**no**",
@@ -206,7 +206,7 @@ def _draw(fitted: Grown, unthinned: Grown, mixed: pd.DataFrame) -> None:
             line[0].set_color("tab:red" if species == "pinus_sylvestris" else "tab:green")
         across = np.array([8.0, 40.0])
         thinning.loglog(across, UNTHINNED[species] * (across / 25.4) ** -1.605, "k:", lw=0.8)
-    thinning.set(xlabel="Dq, cm", ylabel="trees per ha", xlim=(4, 45), ylim=(250, 12000))
+    thinning.set(xlabel="Dq, cm", ylabel="trees per ha", xlim=(4, 45), ylim=(500, 12000))
     thinning.set_title("pine, spruce left to themselves", fontsize=9)
     for species, tables in fitted.items():
         for column, panel in (("top_height_m", heights), ("basal_area_m2ha", areas)):
@@ -229,8 +229,9 @@ _INTRO = """\
 Written by `python analysis/fit_species.py`. With `--species` it moves the parameters of the first
 table by the method of Nelder and Mead on a small plot until the stand comes near its targets. Those
 of pine were set by such searches and then by single trials against the same targets, those of the
-others by trials alone. So nearness to a species' own targets is no proof of the model. The plots,
-two of the three seeds, the spacings and the mixture below are not those that the values were set by.
+others by trials alone; a small mixture had its say in `light_half_saturation`. So nearness to a
+species' own targets is no proof of the model. The plots, two of the three seeds and the spacings
+below are not those that the values were set by.
 """
 
 
