@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "scenarios" / "road_cut_and_storm.py"
+SCRIPTS = Path(__file__).parents[2] / "scenarios"
 SMALL = [
     "plot.size_m=[30, 8]",
     "planting.density_ha=4500",
@@ -19,12 +19,11 @@ SMALL = [
 ]
 
 
-def test_a_road_and_a_storm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    spec = importlib.util.spec_from_file_location("road_cut_and_storm", SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
+def test_a_road_and_a_storm(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(SCRIPTS)
+    script = importlib.import_module("road_cut_and_storm")
     script.main(["--road", "12", "--out", str(tmp_path), *(f"--set={key}" for key in SMALL)])
     said = capsys.readouterr().out
     assert "by distance from the new edge" in said
