@@ -164,7 +164,7 @@ def main(words: Sequence[str] | None = None) -> None:
     """Grow, cut, blow, print and draw."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--scenario", type=Path, default=SCENARIO, help="what to grow")
-    parser.add_argument("--road", type=float, default=20.0, help="width of the road, m (20)")
+    parser.add_argument("--road", type=float, default=30.0, help="width of the road, m (30)")
     parser.add_argument("--out", type=Path, default=Path(), help="folder for picture and table")
     parser.add_argument("--set", action="append", default=[], help="key=value of the scenario")
     given = parser.parse_args(words)
