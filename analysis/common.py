@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,11 +45,14 @@ def script(
     study: Callable[..., Study],
     words: Sequence[str] | None,
     options: Mapping[str, tuple[float, str]] | None = None,
+    *,
+    against: bool = False,
 ) -> None:
     """Answer `python analysis/x.py run.h5 --to figure.png`: draw the figure, print the numbers.
 
     Each of `options` is a number that may be given, `--name 1.5`: its default, and what it is. The
-    study is called with the run and with these by name.
+    study is called with the run and with these by name. With `against` it may be given another
+    run beside the first, by `--against`.
     """
     lines = (document or "").strip().splitlines()
     parser = argparse.ArgumentParser(description=lines[0])
@@ -57,13 +61,18 @@ def script(
     for name, (default, text) in (options or {}).items():
         flag = "--" + name.replace("_", "-")
         parser.add_argument(flag, type=float, default=default, help=f"{text}; default {default:g}")
+    if against:
+        parser.add_argument("--against", type=Path, help="run file to compare it with")
     asked = vars(parser.parse_args(words))
-    path, to = asked.pop("run"), asked.pop("to")
+    path, to, other = asked.pop("run"), asked.pop("to"), asked.pop("against", None)
     try:
-        with forest.open_run(path) as run:
-            if not len(run.years):
-                raise forest.InputError("holds no years yet", where=str(run.path))
-            made = study(run, **asked)
+        with ExitStack() as stack:
+            paths = [path] if other is None else [path, other]
+            runs = [stack.enter_context(forest.open_run(one)) for one in paths]
+            for run in runs:
+                if not len(run.years):
+                    raise forest.InputError("holds no years yet", where=str(run.path))
+            made = study(*runs, **asked)
         save(made.figure, to)
     except forest.InputError as error:
         print(f"error: {error}", file=sys.stderr)

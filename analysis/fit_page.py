@@ -228,7 +228,7 @@ _INTRO = """\
 
 Written by `python analysis/fit_species.py`, which also made the fits: with `--species` it moves the
 parameters of the first table by the method of Nelder and Mead on a small plot until the stand comes
-near its targets. So nearness to a species' own targets is no proof of the model. The plots, seeds,
+near its targets; values were also set by single trials. So nearness to a species' own targets is no proof of the model. The plots, seeds,
 densities and mixtures below are not those of the fits.
 """
 

@@ -100,7 +100,7 @@ def fit(
 def write_values(file: Path, values: Mapping[str, float], source: str) -> None:
     """Put parameters, `section.key`: value, into a species file, and what they were fitted to."""
     text = file.read_text(encoding="utf-8")
-    told = f"fitted by analysis/fit_species.py to {source}"
+    told = f"fitted with analysis/fit_species.py to {source}"
     for name, value in values.items():
         section, key = name.split(".")
         head, rest = text.split(f"[{section}]\n", 1)

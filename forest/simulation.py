@@ -15,6 +15,7 @@ from forest.errors import ActError, InputError
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
 from forest.record.writer import RunWriter, check_target
+from forest.scenario.timing import acts_so_far
 from forest.stand import Stand
 
 if TYPE_CHECKING:
@@ -209,7 +210,7 @@ def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
     for scenario in (one, other):
         content = scenario.model_dump()
         done = range(scenario.start_year, scenario.start_year + years_done)
-        content["acts"] = [act for act in content["acts"] if act["year"] in done]
+        content["acts"] = acts_so_far(scenario.acts, done)
         deaths = content["mortality"]
         deaths["events"] = [event for event in deaths["events"] if event["year"] in done]
         climate = content["climate"]

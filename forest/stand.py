@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from forest.trees.skeleton import Skeleton
 
 
-class Stand:
+class Stand(management.Hand):
     """Trees that grow together in one space, driven year by year.
 
     Parameters
@@ -88,6 +88,8 @@ class Stand:
         Light and space.
     built : Built or None
         How near the first trees are to the inventory that they were built from.
+    treatments : Treatments
+        What acts changed since the last record.
     dead_wood : DeadWood or None
         Snags and lying dead wood, where the scenario has snags.
     memories : dict of str to Memory
@@ -126,8 +128,13 @@ class Stand:
         self.measured_species = MeasureSpecies.of(self.species, self.pipe_exponent)
         self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
+        self.treatments = management.Treatments(self)
         self.storms = Storms(scenario, self.pipe_exponent)
-        self.memories = dict[str, Memory](surroundings=self.surroundings, storms=self.storms)
+        self.memories: dict[str, Memory] = {
+            "surroundings": self.surroundings,
+            "treatments": self.treatments,
+            "storms": self.storms,
+        }
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())
@@ -164,7 +171,7 @@ class Stand:
         self._clock = time.perf_counter()
         self.climate.check_known(self.year + 1)
         mortality.check_due(self)
-        management.act(self, self._traits.of["branch_pipe"])
+        management.act(self, self._traits)
         self._lap("act")
         self.steps += 1
         year = self.growth_year()
@@ -294,6 +301,7 @@ class Stand:
         remember_discs(self.rows, self.arena.metamers, measures)
         self.pending = []
         self.losses = {}
+        self.treatments.clear()
         if deaths:
             alive = np.ones(len(self.rows.tree_id), np.bool_)
             alive[[death.row for death in deaths]] = False
@@ -315,86 +323,6 @@ class Stand:
         now = time.perf_counter()
         self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._clock
         self._clock = now
-
-    # ------------------------------------------------------------------ acts between years
-
-    def plant(
-        self,
-        x: Sequence[float],
-        y: Sequence[float],
-        species: str | Sequence[str],
-        *,
-        lean_deg: float | Sequence[float] = 0.0,
-        lean_azimuth_deg: float | Sequence[float] = 0.0,
-    ) -> list[int]:
-        """Plant seedlings; they start to grow with the next step.
-
-        Parameters
-        ----------
-        x, y : sequences of float
-            Places, m, inside the plot.
-        species : str or sequence of str
-            Name or names of species of the scenario.
-        lean_deg, lean_azimuth_deg : float or sequence of float
-            Angle of the stems to the vertical, 0 to 85, and the direction towards which they lean,
-            from x to y.
-
-        Returns
-        -------
-        list of int
-            The new trees' ids.
-        """
-        return establishment.plant(self, x, y, species, lean_deg, lean_azimuth_deg, self._traits)
-
-    def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> None:
-        """Fell trees: they are gone at once, with an event in the next year's record.
-
-        Parameters
-        ----------
-        tree_ids : sequence of int
-            Living trees; one named twice is felled once.
-        cause : str
-            One of `forest.record.schema.CAUSES`.
-
-        Raises
-        ------
-        InputError
-            If there is no such tree or cause; then none is felled.
-        """
-        management.fell(self, tree_ids, cause)
-
-    def prune(
-        self, tree_id: int, metamer: int | Sequence[int] | None = None, **branches: float
-    ) -> int:
-        """Cut parts off a tree: at metamers, or the branches on its trunk that a choice names.
-
-        Parameters
-        ----------
-        tree_id : int
-            A living tree.
-        metamer : int or sequence of int, optional
-            Serial numbers of metamers: each goes with all that it carries.
-        **branches : float
-            In place of metamers, as in a scenario's acts: `below_m`, the height below which
-            branches go, m; or `side_deg`, the side to which those point that go, with or without
-            `within_deg`, `from_m`, `to_m`. See `forest.scenario.acts.Branches`.
-
-        Returns
-        -------
-        int
-            Metamers removed.
-
-        Raises
-        ------
-        InputError
-            If there is no such tree or metamer, or if the first metamer is to go: fell the tree.
-        """
-        branch_pipe = self._traits.of["branch_pipe"]
-        return management.prune(self, tree_id, metamer, branches, branch_pipe)
-
-    def blow(self, speed_m_s: float, direction_deg: float = 0.0) -> list[int]:
-        """Let a storm throw trees now; give their ids. See `forest.management.blow`."""
-        return management.blow(self, speed_m_s, direction_deg)
 
     # ------------------------------------------------------------------ what it is now
 
@@ -432,10 +360,6 @@ class Stand:
         }
         columns.update(measures.columns())
         return pd.DataFrame(columns)
-
-    def critical_wind(self, direction_deg: float = 0.0) -> pd.DataFrame:
-        """Winds that trees do not withstand; a row each. See `forest.management.critical_wind`."""
-        return management.critical_wind(self, direction_deg)
 
     @property
     def snags(self) -> pd.DataFrame:

@@ -89,8 +89,9 @@ class YearRecord(NamedTuple):
     year : int
         Calendar year.
     tables : dict of table to columns
-        The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`
-        and, where there are any, of `/stability`, `/regeneration` and `/storms`.
+        The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`, where
+        the scenario has them `/stability`, `/deadwood` and `/regeneration`, where acts were done
+        `/treatments`, and where the wind blew `/storms`.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """
@@ -159,6 +160,9 @@ def record_year(
     if stand.dead_wood is not None:
         hectares = plot.size_m[0] * plot.size_m[1] / _SQUARE_METRES_PER_HECTARE
         tables["deadwood"] = stand.dead_wood.columns(stand.year, hectares)
+    treatments = stand.treatments.columns()
+    if treatments:
+        tables["treatments"] = treatments
     blown = stand.storms.take(stand.year)
     if blown:
         tables["storms"] = blown

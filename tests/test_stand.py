@@ -181,7 +181,7 @@ def test_pruning_is_checked(stand: Stand) -> None:
         stand.prune(1, 123456)
     with pytest.raises(InputError, match="carries the whole tree"):
         stand.prune(1, int(stand.skeleton(1).serial[0]))
-    with pytest.raises(InputError, match="expected one of below_m, side_deg"):
+    with pytest.raises(InputError, match="expected one of below_m, below_share"):
         stand.prune(1)
     with pytest.raises(InputError, match=r"Stand\.prune: side: .*did you mean 'side_deg'"):
         stand.prune(1, side=270)

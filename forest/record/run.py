@@ -129,6 +129,11 @@ class Run:
         return self._frame("regeneration")
 
     @property
+    def treatments(self) -> pd.DataFrame:
+        """The stand before and after each act: the columns of `stand`, as the acts left it."""
+        return self._frame("treatments")
+
+    @property
     def storms(self) -> pd.DataFrame:
         """A row per tree and storm: the winds that it does not stand, and whether it stood."""
         return self._frame("storms")

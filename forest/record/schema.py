@@ -48,6 +48,8 @@ DEATH_CAUSES = (
     "other",
 )
 FELLING_CAUSES = ("thinning", "harvest", "tending")
+ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest")
+STAGES = ("before", "after")
 
 #: What a storm does to a tree.
 STORM_OUTCOMES = ("stood", "broken", "uprooted")
@@ -310,6 +312,18 @@ REGENERATION = Table(
     ),
 )
 
+TREATMENTS = Table(
+    "a treatment (an act that was done), before and after it, and species, and one for all species",
+    (
+        Column("year", "int32", "calendar year", "the year before whose growth it was done"),
+        _count("number", "of the treatment in its year, from 1, in the order in which it was done"),
+        _count("act", "of the act in the scenario's list, from 0; -1 if done by hand"),
+        Column("kind", "int8", "", "kind of act", levels=ACT_KINDS),
+        Column("stage", "int8", "", "before or after it", levels=STAGES),
+        *STAND.columns[1:],
+    ),
+)
+
 STORMS = Table(
     "a tree and storm",
     (
@@ -357,6 +371,7 @@ TABLES: dict[str, Table] = {
     "deadwood": DEADWOOD,
     "climate": CLIMATE,
     "regeneration": REGENERATION,
+    "treatments": TREATMENTS,
     "storms": STORMS,
 }
 

@@ -39,8 +39,10 @@ def check_fit(scenario: Scenario) -> None:
         species=scenario.species,
         planted=not isinstance(scenario.planting, Explicit) or bool(scenario.planting.trees),
     )
+    shares = {name: use.share for name, use in scenario.species.items()}
+    regular = isinstance(scenario.planting, Regular)
+    check_acts(scenario.acts, scenario.plot, shares, scenario.calendar, regular)
     check_wind(scenario)
-    check_acts(scenario.acts, scenario.plot, scenario.species, scenario.calendar)
     check_mortality(
         scenario.mortality,
         mechanics=scenario.mechanics is not None,

@@ -29,6 +29,7 @@ _TableName = Literal[
     "climate",
     "deadwood",
     "regeneration",
+    "treatments",
     "storms",
 ]
 
@@ -383,13 +384,14 @@ class Output(Table):
             "climate",
             "deadwood",
             "regeneration",
+            "treatments",
             "storms",
         ),
         "tables to write; stability only has rows where there is a table mechanics, deadwood "
-        "where there are snags, regeneration where there is a table of that name, storms where the "
-        "wind blew",
+        "where there are snags, regeneration where there is a table of that name, treatments "
+        "where there are acts, storms where the wind blew",
         unit="",
-        max_length=10,
+        max_length=11,
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(

@@ -90,9 +90,18 @@ def random_count(size_m: tuple[float, float], density_ha: float, min_distance_m:
 
 
 def random_spots(
-    size_m: tuple[float, float], count: int, min_distance_m: float, seed: int, *, periodic: bool
+    size_m: tuple[float, float],
+    count: int,
+    min_distance_m: float,
+    seed: int,
+    *,
+    periodic: bool,
+    time: int = 0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Place trees uniformly at random, each at least `min_distance_m` from those before it."""
+    """Place trees uniformly at random, each at least `min_distance_m` from those before it.
+
+    Plantings at another `time` draw other places; that of the start is at time 0.
+    """
     from forest.random import STREAM_PLACE, uniforms
 
     distance = max(min_distance_m, SAME_SPOT_M)
@@ -100,7 +109,7 @@ def random_spots(
     x, y = np.empty(count), np.empty(count)
     for tree in range(count):
         for attempt in range(_MOST_TRIES):
-            u, v, _, _ = uniforms(seed, STREAM_PLACE, tree, attempt, 0)
+            u, v, _, _ = uniforms(seed, STREAM_PLACE, tree, attempt, time)
             x[tree], y[tree] = u * size_m[0], v * size_m[1]
             if spots.neighbour(x[tree], y[tree]) is None:
                 spots.take(x[tree], y[tree], tree)
@@ -114,10 +123,10 @@ def random_spots(
     return x, y
 
 
-def draw_species(shares: list[float], count: int, seed: int) -> NDArray[np.int64]:
-    """Draw each tree's species by share; the n-th tree's depends on nothing else."""
+def draw_species(shares: list[float], count: int, seed: int, time: int = 0) -> NDArray[np.int64]:
+    """Draw each tree's species by share; the n-th tree's depends on nothing but the `time`."""
     from forest.random import STREAM_SPECIES, uniforms
 
     upper = np.cumsum(shares) / np.sum(shares)
-    drawn = np.array([uniforms(seed, STREAM_SPECIES, tree, 0, 0)[0] for tree in range(count)])
+    drawn = np.array([uniforms(seed, STREAM_SPECIES, tree, 0, time)[0] for tree in range(count)])
     return np.minimum(np.searchsorted(upper, drawn, side="right"), len(shares) - 1).astype(np.int64)

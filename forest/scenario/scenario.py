@@ -92,7 +92,10 @@ class Scenario(Table):
         (), "what blocks growth and casts shade", unit="", max_length=10000
     )
     acts: tuple[Act, ...] = quantity(
-        (), "what is pruned, felled and planted between years", unit="", max_length=100_000
+        (),
+        "what is pruned, thinned, harvested and planted between years",
+        unit="",
+        max_length=100_000,
     )
     output: Output = Output()
 

@@ -106,9 +106,9 @@ def _wind(scenario: Scenario) -> str:
 
 
 def _acts(scenario: Scenario) -> str:
-    """Name the acts in the order of their years, or the first and last of many."""
-    acts = sorted(scenario.acts, key=lambda act: act.year)
-    named = [f"{act.kind} in {act.year}" for act in acts]
+    """Name the acts in the order of their first years, or the first and last of many."""
+    acts = sorted(scenario.acts, key=lambda act: act.calendar_years(scenario.calendar)[0])
+    named = [f"{act.in_words} {act.time_in_words}" for act in acts]
     if len(named) > _MOST_ACTS:
         named[_MOST_ACTS - 1 : -1] = [f"... ({len(acts)} in all)"]
     return ", ".join(named) or "none"

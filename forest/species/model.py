@@ -367,6 +367,13 @@ class Mensuration(Table):
         7.0, "diameter over bark down to which a stem is merchantable", unit="cm", ge=0, le=100
     )
     stump_height_m: float = quantity(0.3, "height of the stump", unit="m", ge=0, le=2)
+    max_sdi: float = quantity(
+        900.0,
+        "stand density index (Reineke) of the densest pure stands",
+        unit="1/ha",
+        ge=100,
+        le=5000,
+    )
 
 
 SECTIONS: dict[str, type[Table]] = {

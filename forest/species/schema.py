@@ -189,7 +189,8 @@ def _unwrap(annotation: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
 def _members(annotation: Any) -> list[Any]:
     """List the members of a union, without None and `Annotated`; else the annotation itself."""
     if get_origin(annotation) in (Union, types.UnionType):
-        return [_unwrap(arg, [])[0] for arg in get_args(annotation) if arg is not type(None)]
+        inner = [_unwrap(arg, [])[0] for arg in get_args(annotation) if arg is not type(None)]
+        return [member for one in inner for member in _members(one)]
     return [annotation]
 
 

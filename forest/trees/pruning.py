@@ -51,7 +51,8 @@ def branches_of(arena: Metamers, trees: Trees, row: int) -> Branches:
 
 
 def choose_branches(arena: Metamers, trees: Trees, row: int, choice: Choice) -> NDArray[np.int32]:
-    """Choose branches on a tree's trunk: below a height, or on a side between two heights.
+    """Choose branches on a tree's trunk: below a height or a share of the tree's height, or on a
+    side between two heights.
 
     Returns
     -------
@@ -61,6 +62,9 @@ def choose_branches(arena: Metamers, trees: Trees, row: int, choice: Choice) -> 
     serial, height, azimuth = branches_of(arena, trees, row)
     if choice.below_m is not None:
         return serial[height < choice.below_m]
+    if choice.below_share is not None:
+        top = float(arena.tip[_extent(trees, row), 2].max())
+        return serial[height < choice.below_share * top]
     if choice.side_deg is None:
         return serial[:0]
     away = np.abs((azimuth - choice.side_deg + 180.0) % 360.0 - 180.0)

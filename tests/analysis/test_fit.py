@@ -140,7 +140,7 @@ def test_only_the_named_values_change(tmp_path: Path) -> None:
         )
         if old != new
     ]
-    told = "fitted by analysis/fit_species.py to a table"
+    told = "fitted with analysis/fit_species.py to a table"
     assert changed == [
         "area_m2 = 0.0111",
         "vigour_sd = 0.123",

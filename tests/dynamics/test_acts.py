@@ -46,13 +46,17 @@ def test_the_same_as_by_hand() -> None:
     """Whatever their order in the file: first pruning, then felling, then planting."""
     acting, by_hand = Stand(with_acts(*ALL)), Stand(tiny())
     records, others = steps(acting, 5), steps(by_hand, 5)
-    for tree_id in (1, 2):
-        assert by_hand.prune(tree_id, side_deg=270) > 0
+    assert by_hand.prune([1, 2], side_deg=270) > 0
     assert by_hand.prune(4, below_m=0.4) > 0
     by_hand.plant([5, 6], [5, 10], ["fagus_sylvatica", "pinus_sylvestris"])
     records, others = records + steps(acting, 1), others + steps(by_hand, 1)
     by_hand.fell([3, 4], cause="thinning")
-    assert_same_years(records + steps(acting, 2), others + steps(by_hand, 2))
+    records, others = records + steps(acting, 2), others + steps(by_hand, 2)
+    acts = [record.tables["treatments"].pop("act") for record in records[5:7]]
+    assert [list(dict.fromkeys(act.tolist())) for act in acts] == [[2, 3, 0], [1]]
+    for record in others[5:7]:
+        assert set(record.tables["treatments"].pop("act")) == {-1}
+    assert_same_years(records, others)
     assert_same_state(acting, by_hand)
 
 

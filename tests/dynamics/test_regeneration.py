@@ -159,6 +159,39 @@ def test_stumps_of_felled_trees_sprout() -> None:
     assert stand.rows.reserve.min() > 0.0
 
 
+def test_stumps_of_burnt_trees_sprout_a_year_later() -> None:
+    trees = [{"x_m": x + 0.5, "y_m": 4.0, "species": "quercus_robur"} for x in range(8)]
+    fire = {"year": 2003, "x_m": 4.0, "y_m": 4.0, "radius_m": 20.0, "share": 1.0, "cause": "fire"}
+    scenario = _scenario(
+        planting={"kind": "explicit", "trees": trees},
+        regeneration={"handover_height_m": 1.5},
+        mortality={"events": [fire]},
+    )
+    burnt, after = steps(Stand(scenario), 4)[2:]
+    assert len(burnt.tables["trees"]["tree_id"]) == 0
+    assert burnt.tables["regeneration"]["sprouts_ha"].sum() == 0.0
+    assert after.tables["regeneration"]["sprouts_ha"][1] > 0.0
+
+
+def test_succession_from_bare_ground() -> None:
+    """Birch takes the open ground; what comes up beneath it later is beech."""
+    scenario = _scenario(
+        years=45,
+        species={"betula_pendula": {}, "fagus_sylvatica": {}},
+        planting={"kind": "explicit", "trees": []},
+        regeneration={"seed_rain": {"betula_pendula": 200.0, "fagus_sylvatica": 1.0}},
+    )
+    stand = Stand(scenario)
+    years = [record.tables for record in steps(stand, 45)]
+    assert len(years[0]["trees"]["tree_id"]) == 0
+    birch, beech, _ = years[19]["stand"]["basal_area_m2ha"]
+    assert birch > 5.0 * beech
+    recruits = np.array([tables["regeneration"]["recruits_ha"] for tables in years])
+    early, late = recruits[:12].sum(axis=0), recruits[20:].sum(axis=0)
+    assert early[0] > 3.0 * early[1]
+    assert late[1] > 2.0 * late[0]
+
+
 def test_a_gap_is_recolonised_and_a_closed_stand_is_not() -> None:
     """Birch seed falls everywhere; under spruces it comes to nothing, where they are felled not."""
     spruces = [

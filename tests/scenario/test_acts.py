@@ -77,7 +77,7 @@ def test_the_summary_names_acts_by_year() -> None:
         ("kind='fell', year=2003, tree_ids=[2], cause='wind'", "harvest"),
         ("kind='prune', year=2003, below_m=1", "acts[0].tree_id: missing"),
         ("kind='prune', year=2003, tree_id=1, tree_ids=[1], below_m=1", "both given"),
-        ("kind='prune', year=2003, tree_id=1", "expected one of metamer, below_m, side_deg"),
+        ("kind='prune', year=2003, tree_id=1", "expected one of metamer, below_m, below_sh"),
         ("kind='prune', year=2003, tree_id=1, metamer=2, below_m=1", "metamer and below_m"),
         ("kind='prune', year=2003, tree_ids=[1], metamer=2", "acts[0].metamer: a metamer is one"),
         ("kind='prune', year=2003, tree_id=1, below_m=nan", "acts[0].below_m: nan"),

@@ -57,6 +57,24 @@ year = 2005
 x_m = [1, 2]
 y_m = [3, 4]
 species = ["picea_abies"]
+[[acts]]
+kind = "thin"
+when = "sdi > 900"
+from_year = 2002
+method = "selective"
+crop_trees_ha = 100
+species = "picea_abies"
+[[acts]]
+kind = "harvest"
+years = [2006, 2007]
+method = "gap"
+gap = {kind = "ellipse", x_m = 5, y_m = 5, size_m = [4, 3], azimuth_deg = 30}
+[[acts]]
+kind = "plant"
+every_years = 3
+pattern = "random"
+density_ha = 500
+within = {kind = "polygon", points_m = [[1, 1], [5, 1], [5, 5]]}
 [output]
 tables = ["trees"]
 sample_trees = {ids = [1], dbh_quantiles = [0.5], at_year = 2009}

@@ -1,0 +1,7 @@
+"""What people do to a stand between two years: which trees, by which rule, when, and the record."""
+
+from forest.management.doing import act, check_due
+from forest.management.hand import Hand
+from forest.management.treatments import Treatments
+
+__all__ = ["Hand", "Treatments", "act", "check_due"]

@@ -1,0 +1,303 @@
+"""Acts by hand: what a script does to a stand between two steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from forest.errors import InputError
+from forest.management import doing
+from forest.management.plan import Felling, Places, cuts_of, fill
+from forest.management.selection import census_of, to_harvest, to_thin
+from forest.management.treatments import BY_HAND
+from forest.scenario.acts import Branches, Planted, Pruning, check_planted
+from forest.scenario.cuttings import Harvesting, Thinning, check_rule
+from forest.scenario.model import Regular
+from forest.species.schema import Refusal
+from forest.species.text import input_error
+from forest.trees.pruning import choose_branches, find_cuts
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from forest.growth.parameters import SpeciesTraits
+    from forest.stand import Stand
+
+Leans = float | Sequence[float]
+
+
+class Hand:
+    """The acts of `forest.Stand`. Each takes effect at once and is on record with the next year."""
+
+    _traits: SpeciesTraits
+
+    def plant(
+        self,
+        x: Sequence[float] | None = None,
+        y: Sequence[float] | None = None,
+        species: str | Sequence[str] | None = None,
+        *,
+        lean_deg: Leans = 0.0,
+        lean_azimuth_deg: Leans = 0.0,
+        **pattern: Any,
+    ) -> list[int]:
+        """Plant seedlings; they start to grow with the next step.
+
+        Parameters
+        ----------
+        x, y : sequences of float, optional
+            Places, m, inside the plot.
+        species : str or sequence of str, optional
+            Name or names of species of the scenario; of a pattern, those that are mixed.
+        lean_deg, lean_azimuth_deg : float or sequence of float
+            Angle of the stems to the vertical, 0 to 85, and the direction towards which they lean,
+            from x to y.
+        **pattern
+            In place of places, as in a scenario's acts: `pattern` ("regular" or "random") with
+            `spacing_m` or `density_ha`, `min_distance_m`, `shares`, `clear_m`, `within`. See
+            `forest.scenario.acts.Planted`.
+
+        Returns
+        -------
+        list of int
+            The new trees' ids.
+
+        Raises
+        ------
+        InputError
+            If a place lies outside the plot, a species is unknown, or the pattern is not right.
+        """
+        stand = cast("Stand", self)
+        if species is None and not pattern and len(stand.species_names) > 1:
+            known = "one of " + ", ".join(stand.species_names)
+            raise InputError("no species given", where="Stand.plant", expected=known)
+        if x is not None and y is not None and not pattern:
+            names = [species or stand.species_names[0]] * len(x)
+            if species is not None and not isinstance(species, str):
+                names = list(species)
+            places = Places(x, y, cast("list[str]", names))
+        else:
+            places = _pattern(stand, x, y, species, pattern)
+        leans = (lean_deg, lean_azimuth_deg)
+        measures = stand.measure()
+        return doing.plant(stand, BY_HAND, places, leans, self._traits, measures)[1]
+
+    def fell(self, tree_ids: Sequence[int], cause: str = "harvest") -> list[int]:
+        """Fell trees: they are gone at once, with an event in the next year's record.
+
+        Parameters
+        ----------
+        tree_ids : sequence of int
+            Living trees; one named twice is felled once.
+        cause : str
+            One of `forest.record.schema.CAUSES`.
+
+        Returns
+        -------
+        list of int
+            The ids of the felled trees.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree or cause; then none is felled.
+        """
+        stand = cast("Stand", self)
+        felling = doing.felling_by_hand(stand, tree_ids, cause)
+        doing.fell(stand, BY_HAND, felling, stand.measure())
+        return felling.tree_ids
+
+    def blow(self, speed_m_s: float, direction_deg: float = 0.0) -> list[int]:
+        """Let a storm break and uproot trees between two years.
+
+        Their events, and the rows of `/storms`, come with the next year's record.
+
+        Parameters
+        ----------
+        speed_m_s : float
+            Mean wind at the height of the canopy's top over open land, m/s.
+        direction_deg : float
+            Azimuth towards which it blows, from x towards y.
+
+        Returns
+        -------
+        list of int
+            Ids of the trees that fell.
+
+        Raises
+        ------
+        InputError
+            If there is no such storm.
+        """
+        stand = cast("Stand", self)
+        fallen = stand.storms.blow(stand, speed_m_s, direction_deg)
+        ids: list[int] = stand.rows.tree_id[fallen].tolist()
+        doing.take_out(stand, fallen, "windthrown", "wind", stand.measure())
+        return ids
+
+    def critical_wind(self, direction_deg: float = 0.0) -> pd.DataFrame:
+        """Tell the storms of a direction that the trees would not withstand; none falls.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per tree of at least `wind.from_height_m`, with the columns of `/storms` that need
+            no storm.
+        """
+        import pandas as pd
+
+        stand = cast("Stand", self)
+        return pd.DataFrame(stand.storms.critical(stand, direction_deg))
+
+    def thin(self, **rule: Any) -> list[int]:
+        """Thin by rule, as a scenario's act of kind `thin`: ``thin(method="below", n_ha=800)``.
+
+        Parameters
+        ----------
+        **rule
+            The keys of `forest.scenario.cuttings.Thinning`.
+
+        Returns
+        -------
+        list of int
+            The ids of the felled trees; none if the target was met before.
+
+        Raises
+        ------
+        InputError
+            If the rule is not right; then none is felled.
+        """
+        stand = cast("Stand", self)
+        checked = Thinning.of("Stand.thin", **rule)
+        _fits(stand, checked, "Stand.thin")
+        measures = stand.measure()
+        census = census_of(stand, measures)
+        standing = np.ones(len(census.tree_id), np.bool_)
+        rows = to_thin(checked, census, stand, standing, stand.treatments.number + 1)
+        felling = Felling("thin", census.tree_id[np.sort(rows)].tolist(), checked.cause)
+        doing.fell(stand, BY_HAND, felling, measures)
+        return felling.tree_ids
+
+    def harvest(self, **rule: Any) -> list[int]:
+        """Harvest by rule, as a scenario's act of kind `harvest`.
+
+        Parameters
+        ----------
+        **rule
+            The keys of `forest.scenario.cuttings.Harvesting`, as
+            ``harvest(method="gap", gap={"kind": "circle", "x_m": 5, "y_m": 5, "radius_m": 3})``.
+
+        Returns
+        -------
+        list of int
+            The ids of the felled trees.
+
+        Raises
+        ------
+        InputError
+            If the rule is not right; then none is felled.
+        """
+        stand = cast("Stand", self)
+        checked = Harvesting.of("Stand.harvest", **rule)
+        _fits(stand, checked, "Stand.harvest")
+        measures = stand.measure()
+        census = census_of(stand, measures)
+        rows = to_harvest(checked, census, stand, np.ones(len(census.tree_id), np.bool_))
+        felling = Felling("harvest", census.tree_id[rows].tolist(), "harvest")
+        doing.fell(stand, BY_HAND, felling, measures)
+        return felling.tree_ids
+
+    def prune(
+        self,
+        tree_id: int | Sequence[int] | None = None,
+        metamer: int | Sequence[int] | None = None,
+        **choice: Any,
+    ) -> int:
+        """Cut parts off trees: at metamers, or the branches on their trunks that a choice names.
+
+        Parameters
+        ----------
+        tree_id : int or sequence of int, optional
+            Living trees; in place of them `thickest_ha` or `all_trees` in `choice`.
+        metamer : int or sequence of int, optional
+            Serial numbers of metamers of one tree: each goes with all that it carries.
+        **choice
+            In place of metamers, as in a scenario's acts: `below_m`, the height below which
+            branches go, m; `below_share`, that height as a share of the tree's; or `side_deg`,
+            the side to which those point that go, with or without `within_deg`, `from_m`, `to_m`.
+            See `forest.scenario.acts.Pruning`.
+
+        Returns
+        -------
+        int
+            Metamers removed.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree or metamer, or if the first metamer is to go: fell the tree.
+        """
+        stand = cast("Stand", self)
+        arena, trees, where = stand.arena.metamers, stand.rows, "Stand.prune"
+        measures = stand.measure()
+        if isinstance(tree_id, int | np.integer):
+            row = stand.row_of(int(tree_id))
+            if metamer is None:
+                serials = choose_branches(arena, trees, row, Branches.of(where, **choice))
+            elif choice:
+                raise InputError(
+                    f"metamer and {min(choice)} exclude each other",
+                    where=where,
+                    expected="one of them",
+                )
+            else:
+                find_cuts(arena, trees, row, metamer, where=where)
+                serials = np.atleast_1d(np.asarray(metamer, np.int32))
+            cuts = {int(tree_id): serials}
+        else:
+            ids = {} if tree_id is None else {"tree_ids": tuple(int(i) for i in tree_id)}
+            given = {} if metamer is None else {"metamer": metamer}
+            rule = Pruning.of(where, **ids, **given, **choice)
+            with _one_line(where):
+                check_rule(rule, "", stand.scenario.plot, stand.species_names, rows_m=True)
+            census = census_of(stand, measures)
+            standing = np.ones(len(census.tree_id), np.bool_)
+            cuts = cuts_of(rule, stand, census, standing, where)
+        return doing.cut(stand, BY_HAND, cuts, self._traits.of["branch_pipe"], measures)[1]
+
+
+def _pattern(
+    stand: Stand,
+    x: Sequence[float] | None,
+    y: Sequence[float] | None,
+    species: str | Sequence[str] | None,
+    pattern: dict[str, Any],
+) -> Places:
+    where = "Stand.plant"
+    places = {"x_m": () if x is None else x, "y_m": () if y is None else y}
+    names = {} if species is None else {"species": species}
+    act = Planted.of(where, **places, **names, **pattern)
+    shares = {name: use.share for name, use in stand.scenario.species.items()}
+    with _one_line(where):
+        check_planted(act, "", stand.scenario.plot, shares)
+    return fill(act, stand, stand.rows.x, stand.rows.y, stand.treatments.number + 1)
+
+
+def _fits(stand: Stand, rule: Thinning | Harvesting, where: str) -> None:
+    scenario = stand.scenario
+    regular = isinstance(scenario.planting, Regular)
+    with _one_line(where):
+        check_rule(rule, "", scenario.plot, scenario.species, regular)
+
+
+@contextmanager
+def _one_line(where: str) -> Iterator[None]:
+    """Turn a refusal into the user's error; `where` names the act."""
+    try:
+        yield
+    except Refusal as refused:
+        place = f"{where}: {refused.key}" if refused.key else where
+        raise input_error(refused.what, where=place, expected=refused.expected) from None
