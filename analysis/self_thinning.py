@@ -271,8 +271,8 @@ def write_page() -> None:
         _criteria_table(pines),
         "![Self-thinning, and rings beside the weather](gallery/self_thinning.png)\n",
         "Planted at half the density of the table's youngest stand, these have fewer and thicker "
-        "trees than the table's ([8500 per ha](fit.md) come nearer). Misses: basal area stays below "
-        "the table's from age 60 on, by a sixth at 80.\n",
+        "trees than the table's ([8500 per ha](fit.md) come nearer). Misses: basal area stays "
+        "below the table's from age 60 on, by a sixth at 80.\n",
         "## Weather\n",
         f"The same stand (seed {SEEDS[0]}) with 15 % noise on yearly income and half of it in "
         f"year {HARD_YEAR}: {last['n_ha']:.0f} trees per ha and G "
@@ -284,8 +284,8 @@ def write_page() -> None:
         "2500 seedlings per ha on 20 × 20 m, one seed. Ceilings of G to hold them against: spruce "
         "55–70, beech 33, oak 27, birch 19 m²/ha.\n",
         _pure_table(others),
-        "Misses: birch passes its ceiling of basal area by a fifth at 80 years, since nothing kills "
-        "old trees here but suppression.\n",
+        "Misses: birch passes its ceiling of basal area by a fifth at 80 years, since nothing "
+        "kills old trees here but suppression.\n",
     ]
     PAGE.write_text("\n".join(parts), encoding="utf-8")
 
