@@ -197,12 +197,20 @@ def pattern(run: Run) -> pd.DataFrame:
     area = basal_areas(run)
     share = shares(area, LEAST_M2HA)
     enough(share, "basal area of 1 m²/ha", run)
-    pioneers = group(share, LIGHT_DEMANDING)
     passed = overtaking(share)
-    rows: list[tuple[str, Any, str]] = [
-        ("pioneers' share is greatest at age", int(pioneers.idxmax()), "10 to 50"),
-        ("tolerant species pass them at age", np.nan if passed is None else passed, "40 to 100"),
-        ("tolerant species' share at the end", group(share, SHADE_TOLERANT).iloc[-1], ""),
+    rows: list[tuple[str, Any, str]] = []
+    pioneers = [name for name in area if name in LIGHT_DEMANDING]
+    if pioneers:
+        first = str(area[pioneers].max().idxmax())
+        peak = int(share[first].idxmax())
+        rows.append((f"share of {plain(first)} is greatest at age", peak, "10 to 40"))
+    rows += [
+        (
+            "tolerant pass light-demanding species at age",
+            np.nan if passed is None else passed,
+            "40 to 100",
+        ),
+        ("share of tolerant species at the end", group(share, SHADE_TOLERANT).iloc[-1], ""),
     ]
     stand = run.read("stand", ["year", "species", "lai", "floor_light", "basal_area_m2ha"])
     every = stand[stand["species"].astype(str) == "all"]
@@ -227,8 +235,8 @@ def _draw_shares(left: Axes, right: Axes, area: pd.DataFrame) -> None:
     for name, colour in zip(area, colours, strict=True):
         left.plot(area[name], color=colour, lw=1.8, label=plain(name))
     left.plot(total, color="0.6", lw=1.0, ls="--", label="all")
-    left.set(xlabel="stand age, years", ylabel="basal area, m²/ha", ylim=(0, None))
-    left.legend(frameon=False, fontsize=8)
+    left.set(xlabel="stand age, years", ylabel="basal area, m²/ha", ylim=(0, 1.35 * total.max()))
+    left.legend(frameon=False, fontsize=8, ncols=2, loc="upper left")
     right.stackplot(share.index, share.T.to_numpy(), colors=colours, lw=0)
     right.set(xlabel="stand age, years", ylabel="share of basal area", ylim=(0, 1))
     right.margins(x=0.0)

@@ -49,13 +49,19 @@ def report(table: pd.DataFrame, to: Path, heading: str = "") -> None:
     table.to_csv(to, index=False)
 
 
-def draw_map(axes: Axes, trees: pd.DataFrame, size_m: tuple[float, float], title: str) -> None:
-    """Draw crowns, and stems at ten times their thickness."""
+def draw_map(
+    axes: Axes,
+    trees: pd.DataFrame,
+    size_m: tuple[float, float],
+    title: str,
+    thicker: float = 10.0,
+) -> None:
+    """Draw crowns, and stems so many times as thick as they are."""
     places = trees[["x_m", "y_m"]].to_numpy()
     colours = [look_of(name).line for name in trees["species"].astype(str)]
     for width, alpha in (
         (2.0 * trees["crown_radius_m"], 0.18),
-        (0.1 * trees["dbh_cm"].fillna(0.3), 0.9),
+        (0.01 * thicker * trees["dbh_cm"].fillna(0.3), 0.9),
     ):
         axes.add_collection(
             EllipseCollection(
@@ -69,5 +75,6 @@ def draw_map(axes: Axes, trees: pd.DataFrame, size_m: tuple[float, float], title
                 alpha=alpha,
             )
         )
-    axes.set(xlim=(0, size_m[0]), ylim=(0, size_m[1]), aspect="equal", title=title)
+    axes.set(xlim=(0, size_m[0]), ylim=(0, size_m[1]), aspect="equal")
     axes.set(xlabel="x, m", ylabel="y, m")
+    axes.set_title(title, fontsize=10)

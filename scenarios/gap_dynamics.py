@@ -68,12 +68,10 @@ class Watch(Bar):
         grid_x, grid_y = np.meshgrid(x, y)
         watched = inside(self._region, grid_x.ravel(), grid_y.ravel(), plot)
         place_y, place_x = np.divmod(np.arange(cells.count), cells.nx)
-        ours = inside(
-            self._region, (place_x + 0.5) * cells.dx, (place_y + 0.5) * cells.dy, plot
+        ours = inside(self._region, (place_x + 0.5) * cells.dx, (place_y + 0.5) * cells.dy, plot)
+        n = np.bincount(cohorts.species, cohorts.n * ours[cohorts.cell], len(stand.species)) / (
+            ours.sum() * cells.area
         )
-        n = np.bincount(
-            cohorts.species, cohorts.n * ours[cohorts.cell], len(stand.species)
-        ) / (ours.sum() * cells.area)
         self.years.append(
             {
                 "year": stand.year,
@@ -148,14 +146,17 @@ def by_species(
 def draw(
     runs: dict[str, forest.Run], times: dict[str, pd.DataFrame], region: Any, year: int
 ) -> Figure:
-    """Draw the gap's ground three times from above, and what became of it beside closed ground."""
+    """Draw the stand three times from above, and the gap's ground beside closed ground.
+
+    Stems are four times as thick as they are.
+    """
     figure, (maps, curves) = panels(3, 2, size=(4.4, 4.1))
     run = runs["gap"]
     trees = run.trees[run.trees["status"] == "living"]
     last = int(run.years[-1])
     for axes, when in zip(maps, (year, min(year + 20, last), last), strict=True):
         shown = trees[trees["year"] == when].sort_values("height_m")
-        draw_map(axes, shown, run.scenario.plot.size_m, f"{when - year} years after the gap")
+        draw_map(axes, shown, run.scenario.plot.size_m, f"{when - year} years after the gap", 4.0)
         place = (region.x_m, region.y_m)
         axes.add_patch(Disc(place, region.radius_m, fill=False, ls="--", lw=1.0))
     light, number, height = curves
