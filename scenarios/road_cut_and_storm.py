@@ -1,7 +1,8 @@
 """A road cut through a grown stand, and the storm of the year after (Hart & Baker 2003, 6.2).
 
-`python scenarios/road_cut_and_storm.py` grows road_cut_and_storm.toml until the year of its storm,
-fells a strip across the wind, and lets the storm blow; a copy of the stand keeps its trees. It
+`python scenarios/road_cut_and_storm.py` grows road_cut_and_storm.toml until its last year, fells
+a strip across the wind, and lets a storm blow that few trees of the uncut stand do not withstand; a
+copy keeps its trees. It
 prints what winds the trees withstand and which fell, by distance from the new edge and by
 slenderness, and draws both stands and the profile behind the road.
 """
@@ -56,15 +57,20 @@ def cut_road(stand: forest.Stand, road_m: float) -> int:
     return len(ids)
 
 
-def weather_storm(stand: forest.Stand, road_m: float) -> Storm:
-    """Let the scenario's storm blow in the stand's last year."""
-    direction = stand.scenario.wind.storms[0].direction_deg
-    before = stand.critical_wind(direction)
-    least = before[["critical_break_m_s", "critical_uproot_m_s"]].min(axis=1)
+def critical(stand: forest.Stand) -> pd.Series:
+    """The least wind along x that each tree does not withstand, m/s, by tree id."""
+    winds = stand.critical_wind(0.0).set_index("tree_id")
+    return winds[["critical_break_m_s", "critical_uproot_m_s"]].min(axis=1)
+
+
+def weather_storm(stand: forest.Stand, speed_m_s: float, road_m: float) -> Storm:
+    """Let a storm blow along x, and grow the stand's last year."""
+    before = critical(stand)
+    stand.blow(speed_m_s, 0.0)
     record = stand.step()
     trees = pd.DataFrame(record.tables["storms"])
     trees["outcome"] = [OUTCOMES[code] for code in trees["outcome"]]
-    trees["critical_m_s"] = trees["tree_id"].map(dict(zip(before["tree_id"], least, strict=True)))
+    trees["critical_m_s"] = trees["tree_id"].map(before)
     trees["from_edge_m"] = trees["x_m"] - road_m
     trees["slenderness"] = 100.0 * trees["height_m"] / trees["dbh_cm"]
     height = float(record.tables["stand"]["top_height_m"][-1])
@@ -118,7 +124,7 @@ def draw(cut: Storm, uncut: Storm, zones: pd.DataFrame, road_m: float, to: Path)
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(3, 1, figsize=(8, 12.5), height_ratios=[5, 5, 3])
+    figure, axes = plt.subplots(3, 1, figsize=(8, 10), height_ratios=[4, 4, 3])
     shown = {"without road": uncut, f"behind a road of {road_m:g} m": cut}
     worst = np.nanquantile(uncut.trees["critical_m_s"], 0.9)
     for axis, (name, storm) in zip(axes, shown.items(), strict=False):
@@ -140,7 +146,7 @@ def draw(cut: Storm, uncut: Storm, zones: pd.DataFrame, road_m: float, to: Path)
             )
         axis.set(title=name, ylabel="y, m", aspect="equal")
         axis.legend(loc="upper left", fontsize=8)
-        figure.colorbar(marks, ax=axis, label="critical wind, m/s", shrink=0.8)
+        figure.colorbar(marks, ax=axis, label="critical wind, m/s", shrink=0.6)
     if road_m > 0.0:
         axes[1].axvspan(0.0, road_m, color="0.9", zorder=0)
     middle = [zone.mid for zone in zones.index]
@@ -164,7 +170,13 @@ def main(words: Sequence[str] | None = None) -> None:
     """Grow, cut, blow, print and draw."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--scenario", type=Path, default=SCENARIO, help="what to grow")
-    parser.add_argument("--road", type=float, default=20.0, help="width of the road, m (20)")
+    parser.add_argument("--road", type=float, default=30.0, help="width of the road, m (30)")
+    parser.add_argument(
+        "--weak",
+        type=float,
+        default=0.02,
+        help="share of the uncut stand that does not withstand the storm as it begins (0.02)",
+    )
     parser.add_argument("--out", type=Path, default=Path(), help="folder for picture and table")
     parser.add_argument("--set", action="append", default=[], help="key=value of the scenario")
     given = parser.parse_args(words)
@@ -172,12 +184,13 @@ def main(words: Sequence[str] | None = None) -> None:
     uncut = grow(scenario)
     cut = forest.Stand.restore(scenario, *uncut.state())
     felled = cut_road(cut, given.road)
-    with_road, without = weather_storm(cut, given.road), weather_storm(uncut, given.road)
+    speed = float(critical(uncut).quantile(given.weak))
+    with_road = weather_storm(cut, speed, given.road)
+    without = weather_storm(uncut, speed, given.road)
     zones = by_distance(with_road, without, zone_m=5.0)
-    storm = scenario.wind.storms[0]
     print(
         f"top height {without.height_m:.1f} m; road of {given.road:g} m: {felled} trees felled; "
-        f"storm of {storm.speed_m_s:g} m/s"
+        f"storm of {speed:.1f} m/s"
     )
     print("\nby distance from the new edge\n", zones.round(2).to_string(), sep="")
     print("\nby slenderness H/D, behind the road\n", by_slenderness(with_road).to_string(), sep="")

@@ -57,7 +57,11 @@ def test_path_lengths(seed: int, kappa: float) -> None:
         np.testing.assert_allclose(pipe_path[node.index], slow.pipe_path(node, kappa), rtol=1e-5)
 
 
-@given(st.floats(0.0, 1.0), st.sampled_from([0.0, 0.3, 2.0]), st.sampled_from([1.0, 4.0]))
+@given(
+    st.floats(0.0, 1.0, allow_subnormal=False),
+    st.sampled_from([0.0, 0.3, 2.0]),
+    st.sampled_from([1.0, 4.0]),
+)
 def test_light_response(share: float, half: float, full: float) -> None:
     """Full light counts fully, shade by more than its share; without a half, by its share."""
     traits = make_traits(make_species(carbon={"light_half_saturation": half}))
@@ -95,12 +99,12 @@ def test_affordable_scale(seed: int, part: float, most: int, limit: float) -> No
         for bud in range(2):
             on = int(order[i]) + bud
             cost, step, primary = unit[min(on, 7)]
-            cost = cost - primary + stretch[i] * primary
+            cost -= (1.0 - stretch[i]) * primary
             step *= stretch[i] * (kappa if on > 0 else 1.0)
             costs = [cost + pipe_cost * (pipe_path[i] + k * step) for k in range(1, most + 1)]
             buds.append(slow.Bud(v[bud, i], float(carried[i, bud]), tuple(costs)))
     at_most = sum(b.cost(1.0) for b in buds)
-    budget = part * at_most
+    budget = part * at_most * (1.0 + 1e-12)  # sums in another order may differ in the last digits
     s = affordable_scale(
         carried, v[0], v[1], pipe_path, stretch, order, unit, pipe_cost, kappa, most, budget
     )
