@@ -275,15 +275,16 @@ def _draw_profile(axes: Axes, runs: forest.Sweep, table: pd.DataFrame, species: 
         if tree is None:
             continue
         _draw_tree(axes, tree, at)
-        axes.text(at, -0.4, f"{row['spacing_m']:g} m", ha="center", va="top", fontsize=8)
+        axes.text(at, -0.8, f"{row['spacing_m']:g} m", ha="center", va="top", fontsize=8)
         top = max(top, float(tree.end[:, 2].max()))
         at += _APART_M
+    axes.axhspan(-0.6, 0.0, color="white", zorder=3)  # hides the round ends of the stems
     axes.set(
         xlim=(-0.6 * _APART_M, max(at - _APART_M, 0.0) + 0.6 * _APART_M),
         ylim=(-2.0, 1.05 * top),
         aspect="equal",
     )
-    axes.set(xticks=[], ylabel="height, m", title=plain(species))
+    axes.set(xticks=[], title=plain(species))
     axes.spines["bottom"].set_visible(False)
 
 
@@ -291,7 +292,7 @@ def _draw_profile(axes: Axes, runs: forest.Sweep, table: pd.DataFrame, species: 
 _OVER_SPACING = (
     ((("h_d_suppressed", ":"), ("h_d", "-"), ("h_d_dominant", "--")), "H/D"),
     ((("branch_cm", "-"),), "thickest branch, cm"),
-    ((("crown_ratio", "-"),), "crown above the third branch, per height"),
+    ((("crown_ratio", "-"),), "crown ratio"),
 )
 
 
@@ -302,13 +303,14 @@ def study(runs: forest.Sweep, table: pd.DataFrame | None = None) -> Study:
     """
     table = trial(runs) if table is None else table
     names = list(table["species"].unique())
-    figure = Figure(figsize=(10.5, 8.4), layout="constrained")
+    figure = Figure(figsize=(8.6, 6.4), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subfigures(2, 1, height_ratios=[1.25, 1.0])
     profiles = above.subplots(1, len(names), squeeze=False, sharey=True)[0]
     for axes, species in zip(profiles, names, strict=True):
         axes.spines[["top", "right"]].set_visible(False)
         _draw_profile(axes, runs, table, species)
+    profiles[0].set_ylabel("height, m")
     mean = means(table)
     for axes, (columns, label) in zip(below.subplots(1, 3), _OVER_SPACING, strict=True):
         axes.spines[["top", "right"]].set_visible(False)
