@@ -74,13 +74,14 @@ def _trial(**changes: list[float]) -> pd.DataFrame:
         "species": ["pinus_sylvestris"] * 3,
         "spacing_m": [1.0, 2.0, 4.0],
         "replicate": [0] * 3,
-        "h_d_small": [105.0, 90.0, 80.0],
+        "h_d_most": [110.0, 90.0, 80.0],
         "h_d_at_10cm": [100.0, 70.0, 57.0],
         "h_d": [110.0, 80.0, 60.0],
         "h_d_dominant": [90.0, 70.0, 55.0],
         "h_d_suppressed": [130.0, 90.0, 65.0],
         "branch_cm": [1.0, 2.0, 3.0],
         "crown_ratio": [0.3, 0.4, 0.5],
+        "crown_ratio_leaves": [0.4, 0.5, 0.6],
     }
     return pd.DataFrame({**columns, **changes})
 
@@ -89,22 +90,23 @@ def _trial(**changes: list[float]) -> pd.DataFrame:
     ("changes", "broken"),
     [
         ({}, []),
-        ({"h_d_small": [112.0, 90.0, 80.0]}, [0]),
+        ({"h_d_most": [112.0, 90.0, 80.0]}, [0]),
         ({"h_d_at_10cm": [100.0, 70.0, 55.0]}, [1]),
         ({"h_d": [110.0, 60.0, 60.0]}, [2]),
         ({"h_d_suppressed": [130.0, 69.0, 65.0]}, [3]),
         ({"branch_cm": [1.0, 0.9, 3.0]}, [4]),
         ({"crown_ratio": [0.3, 0.4, 0.4]}, [5]),
+        ({"crown_ratio_leaves": [0.5, 0.6, 0.5]}, [6]),
     ],
 )
 def test_rules_by_hand(changes: dict[str, list[float]], broken: list[int]) -> None:
     found = spacing.rules(_trial(**changes))
     assert found.index[found["holds"] == "no"].tolist() == broken
-    assert (found["holds"] == "yes").sum() == 6 - len(broken)
+    assert (found["holds"] == "yes").sum() == 7 - len(broken)
 
 
 def test_rules_are_silent_where_nothing_was_measured() -> None:
     nothing = {"branch_cm": [np.nan] * 3, "h_d_at_10cm": [np.nan] * 3}
     found = spacing.rules(_trial(species=["quercus_robur"] * 3, **nothing))
-    assert found["holds"].tolist() == ["–", "–", "yes", "yes", "–", "yes"]
+    assert found["holds"].tolist() == ["–", "–", "yes", "yes", "–", "yes", "yes"]
     assert found["limit"].tolist()[:2] == ["–", "–"]
