@@ -313,7 +313,7 @@ def study(runs: forest.Sweep, table: pd.DataFrame | None = None) -> Study:
     """
     table = trial(runs) if table is None else table
     names = list(table["species"].unique())
-    figure = Figure(figsize=(8.6, 6.4), layout="constrained")
+    figure = Figure(figsize=(8.2, 6.1), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subfigures(2, 1, height_ratios=[1.25, 1.0])
     profiles = above.subplots(1, len(names), squeeze=False, sharey=True)[0]
