@@ -295,7 +295,6 @@ def _draw_profile(axes: Axes, runs: forest.Sweep, table: pd.DataFrame, species: 
     )
     axes.set(xticks=[], title=plain(species))
     axes.spines["bottom"].set_visible(False)
-    axes.spines["left"].set_bounds(0.0, top)
 
 
 #: Panels over spacing: columns with their line styles, label of the axis.
@@ -321,6 +320,8 @@ def study(runs: forest.Sweep, table: pd.DataFrame | None = None) -> Study:
         axes.spines[["top", "right"]].set_visible(False)
         _draw_profile(axes, runs, table, species)
     profiles[0].set_ylabel("height, m")
+    for axes in profiles:
+        axes.spines["left"].set_bounds(0.0, axes.get_ylim()[1])
     mean = means(table)
     for axes, (columns, label) in zip(below.subplots(1, 3), _OVER_SPACING, strict=True):
         axes.spines[["top", "right"]].set_visible(False)
