@@ -172,7 +172,7 @@ def test_same_with_more_years_later(variant: str, straight: Run, tmp_path: Path)
     """What the scenario says of years to come, acts, storms and deaths, may be said later."""
     overrides = (*VARIANTS[variant], "output.sample_trees={ids=[1, 2]}")
     text = TOML[: TOML.index('[[acts]]\nkind = "harvest"')]
-    for old, new in ((f"years = {YEARS}", "years = 9"), ("storms = [{ year = 2011", "# ")):
+    for old, new in ((f"\nyears = {YEARS}", "\nyears = 9"), ("storms = [{ year = 2011", "# ")):
         assert old in text
         text = text.replace(old, new)
     short = Scenario.from_toml(text).with_overrides(overrides)
