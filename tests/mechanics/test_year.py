@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from forest.measure.trees import BREAST_HEIGHT_M
 from forest.record.run import open_run
 from forest.simulation import simulate
 from forest.stand import Stand
-from tests.mechanics.year_checks import BENDING, assert_rods_fit, rods_of
+from forest.trees import table
+from tests.everything import VARIANTS, everything
+from tests.mechanics.year_checks import BENDING, assert_rods_fit, assert_tree_fits, rods_of
 from tests.tiny import YEARS, assert_same_state, steps, tiny
 
 
@@ -45,6 +48,23 @@ def test_rods_fit_after_planting_pruning_and_felling() -> None:
     young = stand.rows.birth == 4
     assert young.sum() == 3
     assert np.all(stand.rows.size[young] > 1)
+
+
+def test_rods_fit_after_recruits_come() -> None:
+    """A recruit comes with several metamers and the years that it lived as a seedling."""
+    stand = Stand(everything(*VARIANTS["bending"]))
+    several = 0
+    for _ in range(8):
+        several += int((stand.rows.size[_newcomers(stand)] > 1).sum())
+        stand.step()
+        grown = table.keep(stand.rows, ~_newcomers(stand))
+        for row in range(len(grown.tree_id)):
+            assert_tree_fits(stand, grown, row)
+    assert several > 20
+
+
+def _newcomers(stand: Stand) -> NDArray[np.bool_]:
+    return ~table.have_grown(stand.rows, stand.arena.metamers, stand.steps)
 
 
 def _a_branch(stand: Stand, tree_id: int) -> int:
