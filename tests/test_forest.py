@@ -222,4 +222,3 @@ def test_the_ledgers_of_shipped_scenarios(path: Path) -> None:
     assert_follow(living, told)
     ledger = by_cause(pd.concat(population), told)
     assert ledger.living.tolist() == [len(now) for _, now in living]
-    assert stand.next_id > 1
