@@ -127,8 +127,9 @@ def establish(stand: Stand, new: Newcomers, kind: str, traits: SpeciesTraits) ->
     sprout(
         stand.arena.metamers, rows, first_row, new.heading, metamers, traits, stand.growth_year()
     )
-    for field in stand.arena.companions:
-        field[rows.start[first_row:]] = 0  # they get their rods with their first year
+    for start, size in zip(rows.start[first_row:], rows.size[first_row:], strict=True):
+        for field in stand.arena.companions:
+            field[start : start + size] = 0  # they get their rods with their first year
     come = table.keep(rows, np.arange(len(rows.tree_id)) >= first_row)
     full_light = stand.surroundings.full_light
     measures = measure_trees(stand.arena.metamers, come, stand.measured_species, full_light)

@@ -104,12 +104,11 @@ class Stand(management.Hand):
         self._start(scenario)
         if isinstance(scenario.planting, Inventory):
             self.built = settle(self, scenario.planting, Stand, say)
-            management.check_due(self)
-            return
-        first = establishment.Newcomers.planted(
-            *scenario.planting_positions(), headings(*scenario.planting_leans())
-        )
-        establishment.establish(self, first, "planted", self._traits)
+        else:
+            first = establishment.Newcomers.planted(
+                *scenario.planting_positions(), headings(*scenario.planting_leans())
+            )
+            establishment.establish(self, first, "planted", self._traits)
         management.check_due(self)  # what cannot be done in the first year is refused before it
         mortality.check_due(self)
 
@@ -390,7 +389,7 @@ class Stand(management.Hand):
         row = self.row_of(tree_id)
         kind = int(self.rows.species[row])
         metamers, rows = self.arena.metamers, self.rows
-        bent = int(rows.birth[row]) < self.steps  # a seedling just planted has no rods yet
+        bent = bool(table.have_grown(rows, metamers, self.steps)[row])  # newcomers have no rods yet
         if season == "winter" and self.mechanics is not None and bent:
             metamers, rows = self.mechanics.winter(self.arena, self.rows, row)
             row = 0

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 
 import forest  # noqa: E402
 from analysis.common import panels, save  # noqa: E402
-from forest.view.looks import look_of  # noqa: E402
+from scenarios.common import draw_map  # noqa: E402
 
 SCENARIO = Path(__file__).with_suffix(".toml")
 #: Rows of the printed table: column of `/stand`, what it is called.
@@ -65,32 +64,6 @@ def comparison(before: dict[str, float], run: forest.Run) -> pd.DataFrame:
             f"end of {run.years[-1]}": [float(last[name]) for name in ROWS],
         }
     )
-
-
-def draw_map(axes: Axes, trees: pd.DataFrame, size_m: tuple[float, float], title: str) -> None:
-    """Draw crowns, and stems at ten times their thickness."""
-    from matplotlib.collections import EllipseCollection
-
-    places = trees[["x_m", "y_m"]].to_numpy()
-    colours = [look_of(name).line for name in trees["species"].astype(str)]
-    for width, alpha in (
-        (2.0 * trees["crown_radius_m"], 0.18),
-        (0.1 * trees["dbh_cm"].fillna(0.3), 0.9),
-    ):
-        axes.add_collection(
-            EllipseCollection(
-                width,
-                width,
-                np.zeros(len(trees)),
-                units="xy",
-                offsets=places,
-                offset_transform=axes.transData,
-                facecolors=colours,
-                alpha=alpha,
-            )
-        )
-    axes.set(xlim=(0, size_m[0]), ylim=(0, size_m[1]), aspect="equal", title=title)
-    axes.set(xlabel="x, m", ylabel="y, m")
 
 
 def draw(start: pd.DataFrame, end: pd.DataFrame, run: forest.Run) -> Figure:

@@ -22,6 +22,7 @@ from forest.mechanics.stems import NO_RIGIDITY
 from forest.mechanics.year import stem_species
 from forest.random import STREAM_STORM, uniforms
 from forest.scenario.wind import Storm, Wind
+from forest.trees.table import have_grown
 
 if TYPE_CHECKING:
     from forest.measure.trees import TreeMeasures
@@ -163,7 +164,7 @@ class Storms:
 
     def _due_rows(self, stand: Stand, measures: TreeMeasures) -> NDArray[np.bool_]:
         """Rows that a storm may throw: tall enough, and not planted since the last year."""
-        grown = stand.rows.birth < stand.steps  # newcomers have no rods yet
+        grown = have_grown(stand.rows, stand.arena.metamers, stand.steps)  # others have no rods
         tall = measures.height_m >= self._wind.from_height_m
         due: NDArray[np.bool_] = grown & tall & (stand.rows.size > 0)
         return due

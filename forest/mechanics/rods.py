@@ -152,7 +152,8 @@ def _frame_chunks(first, step, arena, trees, shared, rods, year, tropism, stiffn
             begin = np.int64(trees.size[row])
             while begin > 0 and arena.birth[s + begin - 1] == year:
                 begin -= 1
-            if trees.birth[row] >= year - 1:  # planted since the last step: all of it is new
+            # Planted or recruited since the last step: all of it is new, whatever age it came with.
+            if begin > 0 and arena.birth[s] >= year - 1:
                 begin = np.int64(0)
             _frame_tree(
                 arena.parent[s:e],

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError
+from forest.trees.metamers import Metamers
 
 #: Ids that a message lists before it breaks off.
 _LISTED = 8
@@ -23,7 +24,7 @@ COLUMNS: dict[str, tuple[type, int, str]] = {
     "y": (np.float64, 1, "place of the stem base, m"),
     "base_voxel": (np.int32, 3, "near-field voxel of the base (ix, iy, iz)"),
     "base_offset": (np.float32, 3, "place of the base inside that voxel, m"),
-    "birth": (np.int32, 1, "step in which it was planted or recruited"),
+    "birth": (np.int32, 1, "step in which it was planted or, if it came older, germinated"),
     "mother_id": (np.int32, 1, "tree that seeded it; 0 if planted"),
     "start": (np.int64, 1, "first metamer of its extent in the arena"),
     "size": (np.int32, 1, "metamers in use"),
@@ -84,6 +85,30 @@ def keep(trees: Trees, rows: NDArray[np.bool_]) -> Trees:
         name: np.ascontiguousarray(column[rows]) for name, column in trees._asdict().items()
     }
     return Trees(**columns)
+
+
+def have_grown(trees: Trees, metamers: Metamers, steps: int) -> NDArray[np.bool_]:
+    """Tell which trees have grown for a year here; newcomers have neither wood nor rods yet.
+
+    Their age does not tell it: a recruit has lived as a seedling before it comes.
+
+    Parameters
+    ----------
+    trees : Trees
+        n rows.
+    metamers : Metamers
+        Of the arena.
+    steps : int
+        Years grown so far.
+
+    Returns
+    -------
+    bool (n,)
+    """
+    has = np.flatnonzero(trees.size > 0)
+    grown = np.zeros(len(trees.size), np.bool_)
+    grown[has] = metamers.birth[trees.start[has]] < steps
+    return grown
 
 
 def row_of(trees: Trees, tree_id: int, *, where: str) -> int:

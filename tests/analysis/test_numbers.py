@@ -25,7 +25,7 @@ from forest.measure.tables import buck_run, plot_of, sample_skeletons
 from forest.measure.taper import RINGS_READ, disc_diameters, taper_stems
 from forest.record.run import Run
 
-LAST = 1999
+LAST = 2009
 
 
 def _living_samples(run: Run) -> list[int]:
@@ -169,6 +169,21 @@ def test_succession_by_hand():
     assert succession.overtaking(share) == 4
     assert succession.overtaking(share.loc[:3]) is None
     assert succession.overtaking(share[["fagus_sylvatica"]]) == 2
+
+
+def test_turnover_by_hand():
+    # Trees 1 to 4 in years 10 to 12: 2 dies, 3 grows past 10 cm, 4 stays thin.
+    rows = [
+        (10, 1, 20.0, "living"), (10, 2, 12.0, "living"), (10, 3, 9.0, "living"),
+        (10, 4, 5.0, "living"), (11, 1, 21.0, "living"), (11, 2, 12.0, "dead"),
+        (11, 3, 10.0, "living"), (11, 4, 5.0, "dead"), (12, 1, 22.0, "living"),
+        (12, 3, 9.9, "living"),
+    ]  # fmt: skip
+    trees = pd.DataFrame(rows, columns=["year", "tree_id", "dbh_cm", "status"])
+    (row,) = succession.turnover(trees, span=2).to_dict("records")
+    assert row == {"age": 3, "stems": 2.0, "lost": 25.0, "grown": 25.0}
+    assert succession.turnover(trees, span=3).empty
+    assert succession.turnover(trees[trees["dbh_cm"] < 6.0], span=1).empty
 
 
 def test_basal_areas_are_those_of_the_trees(dense_run: Run):

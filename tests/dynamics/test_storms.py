@@ -18,6 +18,8 @@ from forest.scenario import Scenario
 from forest.scenario.wind import YearlyStorms
 from forest.simulation import simulate
 from forest.stand import Stand
+from forest.trees.table import have_grown
+from tests.everything import VARIANTS, everything
 from tests.tiny import assert_same_state, assert_same_years, steps
 
 YEARS = 26
@@ -252,3 +254,16 @@ def test_refused_in_python(grown: Callable[..., Stand]) -> None:
         stand.blow(-1.0)
     with pytest.raises(InputError, match=r"Stand\.critical_wind: direction_deg"):
         stand.critical_wind(float("nan"))
+
+
+def test_recruits_are_let_be_until_they_have_grown() -> None:
+    """They may come tall and years old, but their stems are not yet made."""
+    stand = Stand(everything(*VARIANTS["bending"], "wind.from_height_m=0.1"))
+    steps(stand, 6)
+    grown = have_grown(stand.rows, stand.arena.metamers, stand.steps)
+    old = stand.rows.birth < stand.steps
+    assert (old & ~grown).any()
+    assert set(stand.critical_wind().tree_id) == set(stand.rows.tree_id[grown])
+    fell = stand.blow(60.0)
+    assert fell
+    assert set(fell) <= set(stand.step().tables["storms"]["tree_id"])

@@ -38,9 +38,9 @@ def test_new_frames_follow_from_the_bent_parent(seed: int) -> None:
     settled(case, 1e-4)
     s, n = int(case.trees.start[0]), int(case.trees.size[0])
     begin = max(1, n - int(rng.integers(1, 12)))
-    case.arena.birth[s + begin : s + n] = 1
+    case.arena.birth[s + begin : s + n] = 2
     case.arena.tip[s + begin : s + n] += rng.normal(size=(n - begin, 3)) * 0.02
-    frame_new(*case[:2], deal(case.trees.size), case.rods, 1, np.zeros((1, 3)), np.ones((1, 3)))
+    frame_new(*case[:2], deal(case.trees.size), case.rods, 2, np.zeros((1, 3)), np.ones((1, 3)))
     rods = case.rods
     for i in range(s + begin, s + n):
         p = s + int(case.arena.parent[i])

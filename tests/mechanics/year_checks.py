@@ -27,12 +27,14 @@ def assert_rods_fit(stand: Stand) -> None:
     wood is laid up to the radius.
     """
     for row in range(len(stand.rows.tree_id)):
-        _assert_tree_fits(stand, stand.rows, row)
+        assert_tree_fits(stand, stand.rows, row)
 
 
-def _assert_tree_fits(stand: Stand, trees: Trees, row: int) -> None:
-    arena, rods = stand.arena.metamers, rods_of(stand, row)
+def assert_tree_fits(stand: Stand, trees: Trees, row: int) -> None:
+    """Check the rods of the tree in a row of a table; see `assert_rods_fit`."""
+    arena = stand.arena.metamers
     here = slice(int(trees.start[row]), int(trees.start[row] + trees.size[row]))
+    rods = Rods(*(field[here] for field in stand.arena.companions))
     exponent = stand.pipe_exponent[trees.species[row]]
     radius = (0.5 * arena.pipe[here].astype(np.float64) ** (1.0 / exponent)).astype(np.float32)
     np.testing.assert_allclose(rods.ringed, radius, rtol=1e-6)
