@@ -1,8 +1,8 @@
 """A road cut through a grown stand, and the storm of the year after (Hart & Baker 2003, 6.2).
 
 `python scenarios/road_cut_and_storm.py` grows road_cut_and_storm.toml until its last year, fells
-a strip across the wind, and lets a storm blow that few trees of the uncut stand do not withstand; a
-copy keeps its trees. It
+a strip across the wind, and lets a storm blow that few of the trees left do not withstand as it
+begins; a copy keeps its trees. It
 prints what winds the trees withstand and which fell, by distance from the new edge and by
 slenderness, and draws both stands and the profile behind the road.
 """
@@ -84,7 +84,7 @@ def by_distance(cut: Storm, uncut: Storm, zone_m: float) -> pd.DataFrame:
     -------
     DataFrame
         A row per zone: trees, median critical wind with and without road, their ratio, and the
-        shares of trees that fell.
+        shares of trees that fell, and of those that fell before others had exposed them.
     """
     last = cut.trees["from_edge_m"].max()
     zones = np.arange(0.0, last + zone_m, zone_m)
@@ -100,6 +100,7 @@ def by_distance(cut: Storm, uncut: Storm, zone_m: float) -> pd.DataFrame:
             "critical_m_s": cut.trees["critical_m_s"].groupby(there, observed=False).median(),
             "without_road": uncut.trees["critical_m_s"].groupby(where, observed=False).median(),
             "fell": fell.groupby(there, observed=False).mean(),
+            "fell_first": cut.trees["round"].eq(1).groupby(there, observed=False).mean(),
             "fell_without": uncut.trees["outcome"]
             .ne("stood")
             .groupby(where, observed=False)
@@ -174,8 +175,9 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--weak",
         type=float,
-        default=0.02,
-        help="share of the uncut stand that does not withstand the storm as it begins (0.02)",
+        default=0.05,
+        help="share of the trees behind the road that do not withstand the storm as it begins"
+        " (0.05)",
     )
     parser.add_argument("--out", type=Path, default=Path(), help="folder for picture and table")
     parser.add_argument("--set", action="append", default=[], help="key=value of the scenario")
@@ -184,7 +186,7 @@ def main(words: Sequence[str] | None = None) -> None:
     uncut = grow(scenario)
     cut = forest.Stand.restore(scenario, *uncut.state())
     felled = cut_road(cut, given.road)
-    speed = float(critical(uncut).quantile(given.weak))
+    speed = float(critical(cut).quantile(given.weak))
     with_road = weather_storm(cut, speed, given.road)
     without = weather_storm(uncut, speed, given.road)
     zones = by_distance(with_road, without, zone_m=5.0)
