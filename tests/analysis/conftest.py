@@ -13,7 +13,7 @@ from forest.simulation import simulate
 
 DENSE_STAND = """
 title = "crowded pines among beeches"
-years = 40
+years = 50
 start_year = 1960
 seed = 3
 plot = { size_m = [10, 10], boundary = "periodic" }

@@ -20,9 +20,10 @@ from forest.species import load_species
 from forest.stand import Stand
 from forest.trees.table import keep
 from tests.builders import random_arena
+from tests.fixed import fixed
 from tests.reference import mortality as twin
 from tests.reference.random import uniforms
-from tests.tiny import steps, tiny
+from tests.tiny import TOML, steps, tiny
 
 SPECIES = tuple(load_species(name) for name in ("betula_pendula", "quercus_robur"))
 EXPONENT = np.array([2.0, 2.0])
@@ -131,7 +132,7 @@ def test_plant_area_lands_where_it_stands(seed: int, periodic: bool) -> None:
 
 def grown(*rules: str) -> Stand:
     """Trees of twelve years, of which all die in the year 2012."""
-    stand = Stand(tiny("years=60", "mortality.events=[{year=2012, share=1.0}]", *rules))
+    stand = Stand(fixed(TOML, "years=60", "mortality.events=[{year=2012, share=1.0}]", *rules))
     steps(stand, 12)
     assert not len(stand.trees)
     return stand

@@ -14,7 +14,8 @@ from forest.measure.tables import buck_run, measure_run, plot_of
 from forest.record.run import open_run
 from forest.record.writer import RunWriter
 from forest.simulation import simulate
-from tests.tiny import forest, tiny, write_tiny
+from tests.fixed import fixed
+from tests.tiny import TOML, forest, tiny, write_tiny
 
 PRODUCTS = """name,lengths_m,top_diameter_cm,price_m3
 stake,0.5 1,1,10
@@ -24,7 +25,9 @@ stake,0.5 1,1,10
 @pytest.fixture(scope="module")
 def run_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("measuring")
-    code, _, err = forest("run", write_tiny(folder), "--out", folder / "run.h5", "--no-progress")
+    (folder / "tiny.toml").write_text(fixed(TOML).to_toml())
+    words = "--out", folder / "run.h5", "--no-progress"
+    code, _, err = forest("run", folder / "tiny.toml", *words)
     assert code == 0, err
     (folder / "products.csv").write_text(PRODUCTS)
     return folder / "run.h5"
@@ -121,7 +124,7 @@ def test_drawn_logs_are_near_the_exact_ones(run_file: Path) -> None:
     bare = ("output.sample_trees.ids=[]", "output.sample_trees.dbh_quantiles=[]")
     products = read_products(run_file.parent / "products.csv")
     bare_file = run_file.parent / "bare.h5"
-    with simulate(tiny(*bare), out=bare_file) as without, open_run(run_file) as run:
+    with simulate(fixed(TOML, *bare), out=bare_file) as without, open_run(run_file) as run:
         drawn, mixed = buck_run(without, 2008, products), buck_run(run, 2008, products)
     assert (drawn["stem"] == "drawn").all()
     exact = mixed[mixed["stem"] == "exact"].groupby("tree_id")["volume_m3"].sum()

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from analysis.edge_trees import compare, grow, scenario
 from forest.environment.obstacles import inside
-from forest.scenario import Scenario
 from forest.stand import Stand
 from forest.trees.metamers import LATERAL, TERMINAL
+from tests.fixed import fixed
 
 ABOVE_A_BOX = """
 years = 9
@@ -47,7 +47,7 @@ def _leafy(stand: Stand, row: int) -> tuple[NDArray[np.float32], NDArray[np.bool
 
 def test_what_bends_into_an_obstacle_dies() -> None:
     """Shoots stop before the box; what comes to lie in it has sunk there, and bears no leaves."""
-    stand = Stand(Scenario.from_toml(ABOVE_A_BOX))
+    stand = Stand(fixed(ABOVE_A_BOX))
     around = stand.surroundings
     sunk = 0
     for _ in range(9):
@@ -63,7 +63,7 @@ def test_neighbours_show_in_crowns() -> None:
     """The leaves of two trees that stand close and bend lie away from the other."""
     away = []
     for seed in range(3):
-        stand = Stand(Scenario.from_toml(TWO_TREES).with_overrides([f"seed={seed}"]))
+        stand = Stand(fixed(TWO_TREES, f"seed={seed}"))
         for _ in range(13):
             stand.step()
         for row, side in ((0, -1.0), (1, 1.0)):

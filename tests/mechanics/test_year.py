@@ -14,13 +14,16 @@ from forest.simulation import simulate
 from forest.stand import Stand
 from forest.trees import table
 from tests.everything import VARIANTS, everything
+from tests.fixed import fixed
 from tests.mechanics.year_checks import BENDING, assert_rods_fit, assert_tree_fits, rods_of
-from tests.tiny import YEARS, assert_same_state, steps, tiny
+from tests.tiny import TOML, YEARS, assert_same_state, steps
+
+PINES = TOML.replace(", fagus_sylvatica = {}", "")
 
 
 def test_rods_fit_in_every_year() -> None:
     """Seedlings, growth, shedding: what is stored of a metamer is its own."""
-    stand = Stand(tiny(*BENDING))
+    stand = Stand(fixed(TOML, *BENDING))
     metamers = 0
     shed = False
     for _ in range(YEARS):
@@ -36,7 +39,7 @@ def test_rods_fit_in_every_year() -> None:
 
 
 def test_rods_fit_after_planting_pruning_and_felling() -> None:
-    stand = Stand(tiny(*BENDING))
+    stand = Stand(fixed(TOML, *BENDING))
     steps(stand, 4)
     stand.plant([1.0, 2.0, 9.5], [1.0, 8.0, 9.5], "fagus_sylvatica")
     stand.step()
@@ -76,7 +79,7 @@ def _a_branch(stand: Stand, tree_id: int) -> int:
 
 def test_the_place_in_memory_does_not_matter() -> None:
     """A stand whose extents are laid out anew every year bends to the same bits."""
-    scenario = tiny(*BENDING)
+    scenario = fixed(TOML, *BENDING)
     stand, moved = Stand(scenario), Stand(scenario)
     for _ in range(YEARS - 2):
         stand.step()
@@ -88,7 +91,7 @@ def test_the_place_in_memory_does_not_matter() -> None:
 
 def test_a_branch_that_goes_lets_the_others_rise() -> None:
     """A pruned stem carries less: its lean changes, its wood does not."""
-    stand, pruned = Stand(tiny(*BENDING)), Stand(tiny(*BENDING))
+    stand, pruned = Stand(fixed(TOML, *BENDING)), Stand(fixed(TOML, *BENDING))
     steps(stand, 6)
     steps(pruned, 6)
     before = rods_of(pruned, 0).rigidity[0].copy()
@@ -104,7 +107,7 @@ def test_a_branch_that_goes_lets_the_others_rise() -> None:
 
 @pytest.mark.parametrize("bending", ["true", "false"])
 def test_sample_trees_are_read_back_as_they_stood(tmp_path: Path, bending: str) -> None:
-    scenario = tiny(*BENDING, f"mechanics.bending={bending}", "output.sample_trees={ids=[1, 4]}")
+    scenario = fixed(TOML, *BENDING, f"mechanics.bending={bending}", "output.sample_trees={ids=[1, 4]}")
     simulate(scenario, tmp_path / "run.h5").close()
     stand = Stand(scenario)
     with open_run(tmp_path / "run.h5") as run:
@@ -127,7 +130,7 @@ def test_sample_trees_are_read_back_as_they_stood(tmp_path: Path, bending: str) 
 
 def test_branches_spring_up_in_winter() -> None:
     """Beeches drop leaves and fruit; pines keep their needles and stay as they are."""
-    stand = Stand(tiny(*BENDING))
+    stand = Stand(fixed(TOML, *BENDING))
     steps(stand, YEARS)
     arrays, _ = stand.state()
     risen = {"pinus_sylvestris": [], "fagus_sylvatica": []}  # type: dict[str, list[float]]
@@ -148,7 +151,7 @@ def test_branches_spring_up_in_winter() -> None:
 
 
 def test_a_seedling_that_has_not_bent_stands_in_winter_as_planted() -> None:
-    stand = Stand(tiny(*BENDING))
+    stand = Stand(fixed(TOML, *BENDING))
     np.testing.assert_array_equal(stand.skeleton(1, "winter").end, stand.skeleton(1).end)
     stand.step()
     (young,) = stand.plant([5.0], [5.0], "fagus_sylvatica")
@@ -156,7 +159,7 @@ def test_a_seedling_that_has_not_bent_stands_in_winter_as_planted() -> None:
 
 
 def test_stability_rows() -> None:
-    stand = Stand(tiny(*BENDING))
+    stand = Stand(fixed(TOML, *BENDING))
     for record in steps(stand, YEARS):
         table, trees = record.tables["stability"], record.tables["trees"]
         for name in ("year", "tree_id", "species"):
@@ -167,12 +170,12 @@ def test_stability_rows() -> None:
         assert np.all(table["wind_stress_share"] > table["stress_share"])
         assert np.all(table["stress_height_m"] <= trees["height_m"])
         assert np.all(table["base_moment_nm"] > 0.0)
-    calm = Stand(tiny())
+    calm = Stand(fixed(TOML))
     assert "stability" not in steps(calm, 1)[0].tables
 
 
 def test_wind_loads_stems_and_moves_nothing() -> None:
-    still, windy = (steps(Stand(tiny(f"mechanics={{wind_m_s={v}}}")), 5)[-1] for v in (0, 20))
+    still, windy = (steps(Stand(fixed(TOML, f"mechanics={{wind_m_s={v}}}")), 5)[-1] for v in (0, 20))
     np.testing.assert_array_equal(
         still.tables["trees"]["height_m"], windy.tables["trees"]["height_m"]
     )
@@ -184,7 +187,7 @@ def test_wind_loads_stems_and_moves_nothing() -> None:
 
 @pytest.mark.parametrize("bending", ["true", "false"])
 def test_rings_are_those_of_the_stem_at_breast_height(bending: str) -> None:
-    stand = Stand(tiny(f"mechanics={{bending={bending}}}", "years=14"))
+    stand = Stand(fixed(TOML, f"mechanics={{bending={bending}}}", "years=14"))
     for record in steps(stand, 14):
         rings = record.tables["rings"]
         assert np.all((rings["eccentricity"] >= 0.0) & (rings["eccentricity"] < 1.0))
@@ -202,7 +205,7 @@ def test_rings_are_those_of_the_stem_at_breast_height(bending: str) -> None:
 
 
 def test_rings_of_pines_that_lean_are_thick_below() -> None:
-    stand = Stand(tiny("mechanics={}", "species={pinus_sylvestris={}}", "years=14"))
+    stand = Stand(fixed(PINES, "mechanics={}", "years=14"))
     rings = steps(stand, 14)[-1].tables["rings"]
     breast = stand.measure().breast_metamer
     arena = stand.arena.metamers
@@ -222,7 +225,7 @@ def test_rings_of_pines_that_lean_are_thick_below() -> None:
 
 def test_rings_without_bending_are_thick_towards_the_load() -> None:
     """In pines: below branches, and on the side of the crown at stems."""
-    stand = Stand(tiny("mechanics={bending=false}", "species={pinus_sylvestris={}}", "years=14"))
+    stand = Stand(fixed(PINES, "mechanics={bending=false}", "years=14"))
     steps(stand, 14)
     assert stand.mechanics is not None
     assert stand.mechanics.settled is None

@@ -9,24 +9,39 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.bent_form import curvature, grow, inflections, lean_with_age, s_share, tip_height_m
-from analysis.biomechanics import DECURRENT, FRUIT_KG, fruit, last, life, tilted
+from analysis.biomechanics import DECURRENT, FRUIT_KG, Seedling, fruit, last, life, tilted
 from analysis.tree_form import form_of
 from forest.trees.skeleton import Skeleton
 
 
 def test_tilted_seedlings_right_themselves() -> None:
-    """By strained rings alone: their stems feel neither light nor gravity as they grow."""
-    righted, left = tilted("strain", (5, 10)), tilted("none", (5, 10))
-    for with_it, without in zip(righted, left, strict=True):
-        assert with_it.lean_deg < (20.0 if with_it.year == 5 else 5.0), with_it
-        assert with_it.base_lean_deg < 20.0  # it is the oldest wood that turns
-        assert without.lean_deg > 30.0
-        assert without.base_lean_deg == pytest.approx(30.0, abs=2.0)
+    """By strained rings alone: their stems feel neither light nor gravity as they grow.
+
+    They turn as they thicken; so heights, not years, tell how far they have come.
+    """
+    for species in ("picea_abies", "fagus_sylvatica"):
+        righted, left = (
+            [s for s in tilted(righting, range(1, 21)) if s.species == species]
+            for righting in ("strain", "none")
+        )
+        young = _first_of_height(righted, 0.5)
+        assert 10.0 < young.lean_deg < 25.0
+        grown = _first_of_height(righted, 1.5)
+        assert grown.lean_deg < 5.0
+        assert grown.base_lean_deg < 15.0  # it is the oldest wood that turns
+        assert righted[-1].base_lean_deg < 10.0
+        for without in (_first_of_height(left, 0.5), _first_of_height(left, 1.5), left[-1]):
+            assert without.lean_deg > 30.0
+            assert without.base_lean_deg == pytest.approx(30.0, abs=2.0)
+
+
+def _first_of_height(seedlings: list[Seedling], height_m: float) -> Seedling:
+    return next(s for s in seedlings if s.tree.end[:, 2].max() >= height_m)
 
 
 def test_beta_righting_slows_a_fall_and_rights_nothing() -> None:
     """Rest curvature as printed (eq. 19) knows no direction to go back to in a straight stem."""
-    for beta, none in zip(tilted("beta", (15,)), tilted("none", (15,)), strict=True):
+    for beta, none in zip(tilted("beta", (20,)), tilted("none", (20,)), strict=True):
         assert 30.0 < beta.lean_deg < none.lean_deg - 5.0
 
 
