@@ -34,7 +34,7 @@ RULES = [
     "planting.density_ha=4000",
     "output.sample_trees={ids=[1, 3]}",
     "species.fagus_sylvatica.mortality.background_per_year=0.1",
-    "species.pinus_sylvestris.mortality={longevity_years=9, snag_half_life_years=3}",
+    "species.pinus_sylvestris.mortality={longevity_years=9, snag_half_life_years=1}",
     "mortality={age=true, background=true, buckling=true, snags=true}",
     "mechanics={bending=false}",
     "acts=[{kind='fell', year=2007, tree_ids=[2], cause='tending'}]",
