@@ -39,7 +39,7 @@ AT_CM = 10.0
 OPEN_GROWN = {"picea_abies": 64.0, "pinus_sylvestris": 56.0}
 #: H/D of the mean tree of a very dense stand while it is small (the same).
 VERY_DENSE = {"pinus_sylvestris": 111.0}
-#: Mean diameter at which such a stand counts as small, cm.
+#: Mean diameter from which a stand is compared with it, cm; below, dbh is too near the top.
 SMALL_CM = 5.0
 #: Share of the trees, by dbh, that are the dominant or the suppressed ones.
 FIFTH = 0.2
@@ -112,7 +112,9 @@ def measured(run: Run) -> dict[str, Any]:
     stand = stand[stand["species"].astype(str) == "all"].set_index("year")
     slenderness = 100.0 * now["height_m"] / now["dbh_cm"]
     few = max(int(FIFTH * len(now)), 1)
-    small = stand.index[stand["qmd_cm"] >= SMALL_CM]
+    grown = stand.index[stand["qmd_cm"] >= SMALL_CM]
+    by_year = trees[trees["year"].isin(grown)].groupby("year")
+    course = pd.Series({year: mean_tree_slenderness(of) for year, of in by_year}, dtype=float)
     shapes = [run.skeleton(i, last) for i in run.samples if last in run.sample_years(i)]
     branches = pd.Series([thickest_branch_cm(shape) for shape in shapes], dtype=float)
     crowns = pd.Series([compact_crown_ratio(shape) for shape in shapes], dtype=float)
@@ -123,16 +125,15 @@ def measured(run: Run) -> dict[str, Any]:
         "n_ha": float(stand["n_ha"].iloc[-1]),
         "qmd_cm": float(stand["qmd_cm"].iloc[-1]),
         "top_height_m": float(stand["top_height_m"].iloc[-1]),
-        "h_d_small": mean_tree_slenderness(trees[trees["year"] == small[0]])
-        if len(small)
-        else np.nan,
+        "h_d_small": course.iloc[0] if len(course) else np.nan,
+        "h_d_most": course.max(),
         "h_d_at_10cm": at_size(trees),
         "h_d": mean_tree_slenderness(now),
         "h_d_dominant": slenderness.tail(few).mean(),
         "h_d_suppressed": slenderness.head(few).mean(),
         "branch_cm": branches.mean(),
         "crown_ratio": crowns.mean(),
-        "lowest_leaves": (now["crown_base_m"] / now["height_m"]).mean(),
+        "crown_ratio_leaves": (1.0 - now["crown_base_m"] / now["height_m"]).mean(),
     }
 
 
@@ -143,10 +144,11 @@ def trial(runs: forest.Sweep) -> pd.DataFrame:
     -------
     DataFrame
         A row per run: `species`, `spacing_m`, `replicate`; living trees, mean diameter and top
-        height; H/D of the mean tree when its diameter passed 5 cm (`h_d_small`), of all trees as
-        they passed 10 cm, of the mean tree in the last year, of the thickest and of the thinnest
-        fifth; mean over the sample trees of the thickest branch's diameter, cm, and of the compact
-        crown's ratio; mean height of the lowest leaves of all trees per tree height.
+        height; H/D of the mean tree in the year in which its diameter passed 5 cm (`h_d_small`),
+        its greatest since (`h_d_most`), of all trees as they passed 10 cm, of the mean tree in the
+        last year, of the thickest and of the thinnest fifth; mean over the sample trees of the
+        thickest branch's diameter, cm, and of the compact crown's ratio; mean crown ratio of
+        all trees from their lowest leaves (`crown_ratio_leaves`).
     """
     rows = []
     for _, row in runs.manifest[runs.manifest["status"] == "done"].iterrows():
@@ -193,14 +195,14 @@ def rules(table: pd.DataFrame) -> pd.DataFrame:
         most, least = VERY_DENSE.get(str(species)), OPEN_GROWN.get(str(species))
         more = of["h_d_suppressed"] - of["h_d_dominant"]
         known = of["h_d_at_10cm"].dropna()
-        young = of["h_d_small"].head(1)
+        densest = of["h_d_most"].head(1)
         for rule, found, digits, limit, verdict in (
             (
-                "H/D of the mean tree when 5 cm thick, densest",
-                young,
+                "greatest H/D of the mean tree, densest",
+                densest,
                 0,
                 "–" if most is None else f"at most {most:g}",
-                "–" if most is None else _verdict(bool((young <= most).all()), young),
+                "–" if most is None else _verdict(bool((densest <= most).all()), densest),
             ),
             (
                 "H/D at 10 cm",
@@ -225,11 +227,18 @@ def rules(table: pd.DataFrame) -> pd.DataFrame:
                 _verdict(_falls(-of["branch_cm"]), of["branch_cm"]),
             ),
             (
-                "crown ratio",
+                "crown ratio, from the third branch",
                 of["crown_ratio"],
                 2,
                 "rises",
                 _verdict(_falls(-of["crown_ratio"]), of["crown_ratio"]),
+            ),
+            (
+                "crown ratio, from the lowest leaves",
+                of["crown_ratio_leaves"],
+                2,
+                "rises",
+                _verdict(_falls(-of["crown_ratio_leaves"]), of["crown_ratio_leaves"]),
             ),
         ):
             rows.append((str(species), rule, _chain(found, digits), limit, verdict))
@@ -275,23 +284,25 @@ def _draw_profile(axes: Axes, runs: forest.Sweep, table: pd.DataFrame, species: 
         if tree is None:
             continue
         _draw_tree(axes, tree, at)
-        axes.text(at, -0.4, f"{row['spacing_m']:g} m", ha="center", va="top", fontsize=8)
+        axes.text(at, -0.8, f"{row['spacing_m']:g} m", ha="center", va="top", fontsize=8)
         top = max(top, float(tree.end[:, 2].max()))
         at += _APART_M
+    axes.axhspan(-0.6, 0.0, color="white", zorder=3)  # hides the round ends of the stems
     axes.set(
         xlim=(-0.6 * _APART_M, max(at - _APART_M, 0.0) + 0.6 * _APART_M),
         ylim=(-2.0, 1.05 * top),
         aspect="equal",
     )
-    axes.set(xticks=[], ylabel="height, m", title=plain(species))
+    axes.set(xticks=[], title=plain(species))
     axes.spines["bottom"].set_visible(False)
+    axes.spines["left"].set_bounds(0.0, top)
 
 
 #: Panels over spacing: columns with their line styles, label of the axis.
 _OVER_SPACING = (
     ((("h_d_suppressed", ":"), ("h_d", "-"), ("h_d_dominant", "--")), "H/D"),
     ((("branch_cm", "-"),), "thickest branch, cm"),
-    ((("crown_ratio", "-"),), "crown above the third branch, per height"),
+    ((("crown_ratio", "-"), ("crown_ratio_leaves", ":")), "crown ratio"),
 )
 
 
@@ -302,13 +313,14 @@ def study(runs: forest.Sweep, table: pd.DataFrame | None = None) -> Study:
     """
     table = trial(runs) if table is None else table
     names = list(table["species"].unique())
-    figure = Figure(figsize=(10.5, 8.4), layout="constrained")
+    figure = Figure(figsize=(8.2, 6.1), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subfigures(2, 1, height_ratios=[1.25, 1.0])
     profiles = above.subplots(1, len(names), squeeze=False, sharey=True)[0]
     for axes, species in zip(profiles, names, strict=True):
         axes.spines[["top", "right"]].set_visible(False)
         _draw_profile(axes, runs, table, species)
+    profiles[0].set_ylabel("height, m")
     mean = means(table)
     for axes, (columns, label) in zip(below.subplots(1, 3), _OVER_SPACING, strict=True):
         axes.spines[["top", "right"]].set_visible(False)
@@ -324,6 +336,9 @@ def study(runs: forest.Sweep, table: pd.DataFrame | None = None) -> Study:
     for style, name in ((":", "thinnest fifth"), ("-", "mean tree"), ("--", "thickest fifth")):
         slenderness.plot([], [], style, color="0.3", label=name)
     slenderness.legend(frameon=False, fontsize=8)
+    for style, name in (("-", "third branch"), (":", "lowest leaves")):
+        below.axes[2].plot([], [], style, color="0.3", label=f"from the {name}")
+    below.axes[2].legend(frameon=False, fontsize=8)
     return Study(figure, mean)
 
 

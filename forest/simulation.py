@@ -65,7 +65,7 @@ def simulate(
     resume : bool
         Go on with an unfinished run of the same scenario, from its last checkpoint; a run without
         one starts over. A finished run is given back, and goes on if `scenario.years` has grown.
-        Acts, deaths and climate of years that are not on file may differ.
+        Acts, deaths, storms and climate of years that are not on file may differ.
     overwrite : bool
         Replace an existing file.
     progress : bool or Observer
@@ -190,7 +190,7 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
                 "was made by a different scenario",
                 where=f"--resume {out}",
                 expected="the same scenario, seed and settings; only `years` may grow, and acts, "
-                "deaths and climate of years that are not on file may differ",
+                "deaths, storms and climate of years that are not on file may differ",
             )
         if years_done > scenario.years:
             raise InputError(
@@ -202,7 +202,7 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
 
 
 def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
-    """Compare two scenarios but for their years, and for acts, deaths and climate to come.
+    """Compare two scenarios but for their years, and for acts, deaths, storms and climate to come.
 
     Each may choose its sample trees in its own last year.
     """
@@ -213,6 +213,9 @@ def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
         content["acts"] = acts_so_far(scenario.acts, done)
         deaths = content["mortality"]
         deaths["events"] = [event for event in deaths["events"] if event["year"] in done]
+        wind = content["wind"]
+        if wind is not None:
+            wind["storms"] = [storm for storm in wind["storms"] if storm["year"] in done]
         climate = content["climate"]
         if not climate["repeat"]:  # a series may go on
             climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]

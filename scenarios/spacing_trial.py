@@ -30,11 +30,11 @@ SPACINGS_M = (1.0, 1.5, 2.5, 4.0)
 
 
 def plots(base: forest.Scenario) -> dict[str, forest.Scenario]:
-    """Give the trial's plots by name; each as wide as the base's, or nearly: a number of rows."""
+    """Give the trial's plots by name; each about as wide as the base's: an even number of rows."""
     made = {}
     for species in SPECIES:
         for spacing in SPACINGS_M:
-            width = spacing * max(round(base.plot.size_m[0] / spacing), 2)
+            width = 2.0 * spacing * max(round(0.5 * base.plot.size_m[0] / spacing), 1)
             made[f"{species}_{spacing:g}m"] = base.with_overrides(
                 [
                     f"species={{{species}={{}}}}",

@@ -1,4 +1,4 @@
-"""A thinning trial: one pine stand left alone, or thinned in four ways, three seeds each.
+"""A thinning trial: one pine stand left alone, or thinned in five ways, three seeds each.
 
     python scenarios/thinning_trial.py --out out/thinning
 
@@ -9,7 +9,8 @@ notice either. The ways:
 
 * moderate, from below: every ten years the thinnest trees with 12 % of the basal area;
 * heavy, from below: the same with 30 %;
-* crown, from above: the strongest competitors of the 300 thickest trees per ha, with 12 %;
+* crown thinning, from above: the strongest competitors of the 300 thickest trees per ha, with 12 %;
+* thickest, from above: every ten years the thickest trees with 12 %, as who needs money fells;
 * geometric: every third row at 24 years, nothing later.
 
 The script grows all plots (files that are there already are kept), prints the trial and draws it;
@@ -46,16 +47,18 @@ WAYS: dict[str, str | None] = {
     "heavy_below": f"[{{{EVERY_TEN_YEARS}, method='below', share_g=0.3}}]",
     "crown": f"[{{{EVERY_TEN_YEARS}, method='selective', crop_trees_ha=300, crop_spacing_m=3, "
     "share_g=0.12}]",
+    "above": f"[{{{EVERY_TEN_YEARS}, method='above', share_g=0.12}}]",
     "geometric": "[{kind='thin', when='age >= 24', at_most=1, method='geometric', every_row=3}]",
 }
 LABELS = {
     "unthinned": "unthinned",
     "moderate_below": "moderate, from below",
     "heavy_below": "heavy, from below",
-    "crown": "crown, from above",
+    "crown": "crown thinning, from above",
+    "above": "thickest, from above",
     "geometric": "geometric",
 }
-COLOURS = ("0.45", "tab:green", "tab:red", "tab:purple", "tab:orange")
+COLOURS = ("0.45", "tab:green", "tab:red", "tab:purple", "tab:blue", "tab:orange")
 FATES = {"standing": 0.35, "removed": 0.9, "dead": 0.12}
 
 
@@ -139,10 +142,10 @@ def draw_production(axes: Axes, mean: pd.DataFrame) -> None:
         axes.bar(at, height, 0.7, bottom=bottom, color=shade, edgecolor="0.3", lw=0.5)
         for x, low, tall in zip(at, bottom, height, strict=True):
             if tall > 0.05 * mean["total_m3ha"].max():
-                axes.text(x, low + 0.5 * tall, fate, ha="center", va="center", fontsize=7)
+                axes.text(x, low + 0.5 * tall, fate, ha="center", va="center", fontsize=6)
         bottom += height
     axes.errorbar(at, bottom, mean["total_sd"].fillna(0.0), fmt="none", ecolor="k", capsize=3)
-    axes.set_xticks(at, [LABELS[name].replace(", ", ",\n") for name in mean["way"]], fontsize=7)
+    axes.set_xticks(at, [LABELS[name].replace(" ", "\n") for name in mean["way"]], fontsize=7)
     axes.set(ylabel="stem volume produced, m³/ha")
 
 

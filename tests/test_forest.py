@@ -19,7 +19,7 @@ from forest.record.schema import CAUSES, DEATH_CAUSES, EVENT_KINDS, FELLING_CAUS
 from forest.scenario import Scenario
 from forest.simulation import simulate
 from forest.stand import Stand
-from tests.everything import VARIANTS, YEARS, everything
+from tests.everything import TOML, VARIANTS, YEARS, everything
 from tests.tiny import assert_same_runs, assert_same_state, assert_same_years, steps
 
 SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios").rglob("*.toml"))
@@ -166,6 +166,24 @@ def test_same_killed_twice(variant: str, straight: Run, tmp_path: Path) -> None:
     with simulate(Scenario.load(scenario), out, resume=True) as run:
         assert len(run.provenance["sessions"]) == 3
         assert_same_runs(straight, run)
+
+
+def test_same_with_more_years_later(variant: str, straight: Run, tmp_path: Path) -> None:
+    """What the scenario says of years to come, acts, storms and deaths, may be said later."""
+    overrides = (*VARIANTS[variant], "output.sample_trees={ids=[1, 2]}")
+    text = TOML[: TOML.index('[[acts]]\nkind = "harvest"')]
+    for old, new in ((f"\nyears = {YEARS}", "\nyears = 9"), ("storms = [{ year = 2011", "# ")):
+        assert old in text
+        text = text.replace(old, new)
+    short = Scenario.from_toml(text).with_overrides(overrides)
+    out = tmp_path / "run.h5"
+    simulate(short, out).close()
+    with (
+        simulate(everything(*overrides), out, resume=True) as run,
+        simulate(everything(*overrides), tmp_path / "whole.h5") as whole,
+    ):
+        assert_same_runs(whole, run)
+        assert run.trees.equals(straight.trees)
 
 
 @pytest.mark.parametrize("years", [4, 9])

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from forest.dynamics.mortality import Death
 from forest.growth.dealing import Workbench, deal
 from forest.mechanics.fetch import Exposure, Ways, expose, heading, lay_ways
+from forest.mechanics.momentum import LAYERS, Crowns, canopies, draw_crowns, fill_winds, layer_of
 from forest.mechanics.overthrow import Blow, Critical, find_critical
 from forest.mechanics.shelter import Plot, silhouettes
 from forest.mechanics.stems import NO_RIGIDITY
-from forest.mechanics.stress import wind_profile
 from forest.mechanics.year import stem_species
 from forest.random import STREAM_STORM, uniforms
 from forest.scenario.wind import Storm, Wind
@@ -40,8 +40,10 @@ class _Passage(NamedTuple):
     """A storm over a stand, round by round; one entry per row of the table."""
 
     ways: Ways
+    crowns: Crowns
     standing: NDArray[np.bool_]
     exposure: Exposure
+    density: NDArray[np.float64]
     critical: Critical
     outcome: NDArray[np.int8]
     round: NDArray[np.int16]
@@ -183,18 +185,25 @@ class Storms:
         canopy = float(seen.frontal @ seen.height / weight) if weight > 0.0 else 0.0
         canopy = max(canopy, 0.1)
         ways = lay_ways(trees.x, trees.y, canopy, direction_deg, self._plot)
+        to, top = heading(direction_deg), float(seen.height.max(initial=0.0))
+        crowns = draw_crowns(arena.metamers, trees, self._stems, to, top)
         rigidity = arena.companions.rigidity if arena.companions else NO_RIGIDITY
         shared = deal(trees.size)
         scratch = self._workbench.scratch(shared)
         critical = Critical(np.full(n, np.nan), np.full(n, np.nan))
         outcome, rounds = np.zeros(n, np.int8), np.zeros(n, np.int16)
         exposure = Exposure(*(np.full(n, np.nan) for _ in Exposure._fields))
+        density = np.full((n, LAYERS), np.nan)
         for number in range(1, n + 2):
             felt = expose(seen.height, standing, ways)
-            changed = (felt.share != exposure.share) | (felt.attenuation != exposure.attenuation)
+            around = canopies(standing, crowns, ways)
+            changed = (felt.edge != exposure.edge) | (felt.gusts != exposure.gusts)
+            changed |= (around != density).any(axis=1)
+            density[standing] = around[standing]
             for now, then in zip(felt, exposure, strict=True):
                 then[standing] = now[standing]
-            blow = Blow(*heading(direction_deg), canopy, exposure.share, exposure.attenuation)
+            where = (density, exposure.edge, exposure.gusts)
+            blow = Blow(*to, canopy, crowns.thick, crowns.share, *where)
             find_critical(
                 arena.metamers,
                 trees,
@@ -215,7 +224,7 @@ class Storms:
             outcome[falls] = np.where(broken, BROKEN, UPROOTED)[falls]
             rounds[falls] = number
             standing[falls] = False
-        return _Passage(ways, standing, exposure, critical, outcome, rounds)
+        return _Passage(ways, crowns, standing, exposure, density, critical, outcome, rounds)
 
     # ------------------------------------------------------------------ the rows of /storms
 
@@ -229,9 +238,6 @@ class Storms:
     ) -> None:
         rows = np.flatnonzero(due)
         n = len(rows)
-        canopy = passed.ways.canopy_height
-        fall = passed.exposure.attenuation
-        at_top = [wind_profile(float(measures.height_m[r]), canopy, float(fall[r])) for r in rows]
         self._rows.append(
             {
                 "tree_id": stand.rows.tree_id[rows],
@@ -241,7 +247,7 @@ class Storms:
                 "y_m": stand.rows.y[rows],
                 "storm_m_s": np.full(n, storm.speed_m_s),
                 "direction_deg": np.full(n, storm.direction_deg),
-                "wind_m_s": storm.speed_m_s * passed.exposure.share[rows] * np.array(at_top),
+                "wind_m_s": _at_tops(passed, storm.speed_m_s, measures.height_m, rows),
                 "edge": passed.exposure.edge[rows],
                 "critical_break_m_s": passed.critical.breaks[rows],
                 "critical_uproot_m_s": passed.critical.uproots[rows],
@@ -274,6 +280,19 @@ class Storms:
             {name: column[a:b] for name, column in columns.items()}
             for a, b in zip(starts, ends, strict=bool(len(ends)))
         ]
+
+
+def _at_tops(
+    passed: _Passage, speed: float, height: NDArray[np.floating[Any]], rows: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Mean wind at the tops of trees, m/s."""
+    thick, canopy = passed.crowns.thick, passed.ways.canopy_height
+    winds, found = np.zeros((3, LAYERS)), np.empty(len(rows))
+    for k, row in enumerate(rows):
+        edge = passed.exposure.edge[row]
+        fill_winds(speed, canopy, thick, passed.density[row], edge, winds)
+        found[k] = winds[0, layer_of(float(height[row]), thick)]
+    return found
 
 
 def _joined(parts: list[Columns]) -> Columns:

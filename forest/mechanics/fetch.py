@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.mechanics.shelter import Plot
-from forest.mechanics.stress import ATTENUATION
 
 #: How far upwind trees and gaps matter, in heights of the canopy: a gap of 10, a stand of 10.
 FETCH = 20.0
@@ -33,8 +32,6 @@ HALF_WIDTH = 0.5
 CLOSEST, WIDEST = 0.075, 0.45
 #: A gap that exposes an edge fully, in heights of the canopy, and how shorter ones do.
 FULL_GAP, GAP_POWER = 10.0, 0.3467
-#: Height in the canopy where the load of a whole tree acts; there its wind is sqrt(m).
-DRAG_HEIGHT = 0.75
 
 _BINS = 32  # fixed, so that results do not depend on the number of threads
 _STRETCHES = round(FETCH / STRETCH)
@@ -76,14 +73,12 @@ class Exposure(NamedTuple):
     ----------
     spacing : of the trees around, m; no more than `WIDEST` canopy heights
     edge : E, 0 (far within a stand) to 1 (at an edge behind a long gap)
-    share : wind at the canopy's top per that over open land
-    attenuation : how fast it falls below
+    gusts : moment of gusts, m, per that of a tree as far from others and far within a stand
     """
 
     spacing: NDArray[np.float64]
     edge: NDArray[np.float64]
-    share: NDArray[np.float64]
-    attenuation: NDArray[np.float64]
+    gusts: NDArray[np.float64]
 
 
 def heading(direction_deg: float) -> tuple[float, float]:
@@ -149,7 +144,7 @@ def _images(canopy_height: float, plot: Plot) -> list[tuple[float, float]]:
 
 
 @njit
-def _from(values, low, high, least):  # type: ignore[no-untyped-def]
+def first_from(values, low, high, least):  # type: ignore[no-untyped-def]
     """The first of ascending values[low:high] that is at least `least`."""
     while low < high:
         middle = (low + high) // 2
@@ -181,7 +176,7 @@ def _space_of(row, height, standing, ways):  # type: ignore[no-untyped-def]
     beside = 0.0
     for at in range(max(strip - 1, 0), min(strip + 2, len(ways.first) - 1)):
         end = ways.first[at + 1]
-        for k in range(_from(ways.other_along, ways.first[at], end, u - reach), end):
+        for k in range(first_from(ways.other_along, ways.first[at], end, u - reach), end):
             du = ways.other_along[k] - u
             dv = ways.other_across[k] - v
             if du > reach:
@@ -212,7 +207,7 @@ def _gather(row, height, standing, spacing, ways, cover, decay):  # type: ignore
     strip = int((v - ways.low) / reach)
     for at in range(max(strip - 1, 0), min(strip + 2, len(ways.first) - 1)):
         end = ways.first[at + 1]
-        for k in range(_from(ways.other_along, ways.first[at], end, u - FETCH * canopy), end):
+        for k in range(first_from(ways.other_along, ways.first[at], end, u - FETCH * canopy), end):
             distance = u - ways.other_along[k]
             if distance <= 0.0:
                 break
@@ -271,7 +266,6 @@ def _space(first, step, height, standing, ways, spacing):  # type: ignore[no-unt
 def _follow(first, step, height, standing, ways, scratch, out):  # type: ignore[no-untyped-def]
     n = len(height)
     canopy = ways.canopy_height
-    lone = gust_load(WIDEST, 1.0)
     for b in range(first, _BINS, step):
         for row in range(b * n // _BINS, (b + 1) * n // _BINS):
             if not standing[row]:
@@ -279,11 +273,9 @@ def _follow(first, step, height, standing, ways, scratch, out):  # type: ignore[
             scratch[b] = 0.0
             _gather(row, height, standing, out.spacing, ways, scratch[b, 0], scratch[b, 1])
             edge = _edge_of(canopy, scratch[b, 0], scratch[b, 1])
-            fall = ATTENUATION * (1.0 - edge)
-            load = gust_load(out.spacing[row] / canopy, edge) / lone
+            space = out.spacing[row] / canopy
             out.edge[row] = edge
-            out.attenuation[row] = fall
-            out.share[row] = np.sqrt(load) * np.exp(fall * (1.0 - DRAG_HEIGHT))
+            out.gusts[row] = gust_load(space, edge) / gust_load(space, 0.0)
 
 
 def expose(height: NDArray[np.float64], standing: NDArray[np.bool_], ways: Ways) -> Exposure:
@@ -308,9 +300,7 @@ def expose(height: NDArray[np.float64], standing: NDArray[np.bool_], ways: Ways)
     A tree's spacing s is that of the trees within half a canopy height before or behind it,
     whichever are closer, and each covers s^2 of the
     ground of the way, which is one canopy height wide. A tree upwind counts in full if it is
-    at least as tall, not at all if half as tall or less, linearly between. sqrt(m), per that of
-    a lone tree, is the wind at `DRAG_HEIGHT`; it falls downwards as exp(-a (1 - z / h)) with
-    a = `ATTENUATION` (1 - E), as the wind blows into an edge at all heights.
+    at least as tall, not at all if half as tall or less, linearly between.
     """
     n = len(height)
     out = Exposure(*(np.full(n, np.nan) for _ in Exposure._fields))

@@ -179,7 +179,7 @@ def test_succession_from_bare_ground() -> None:
         years=45,
         species={"betula_pendula": {}, "fagus_sylvatica": {}},
         planting={"kind": "explicit", "trees": []},
-        regeneration={"seed_rain": {"betula_pendula": 200.0, "fagus_sylvatica": 1.0}},
+        regeneration={"seed_rain": {"betula_pendula": 200.0, "fagus_sylvatica": 0.3}},
     )
     stand = Stand(scenario)
     years = [record.tables for record in steps(stand, 45)]

@@ -85,4 +85,4 @@ def test_the_fallen_expose_and_the_low_shelter_nobody() -> None:
     low = expose(np.where(lee, 15.0, 7.0), np.ones(300, np.bool_), ways)
     assert (cleared.edge[lee] > all_stand.edge[lee]).all()
     np.testing.assert_array_equal(low.edge[lee], cleared.edge[lee])
-    assert np.isnan(cleared.share[~lee]).all()
+    assert np.isnan(cleared.gusts[~lee]).all()

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from forest.mechanics.fetch import expose, lay_ways
+from forest.mechanics.momentum import LAYERS, Crowns, canopies, layer_of
 from forest.mechanics.overthrow import critical_speeds
 from forest.mechanics.shelter import Plot
 from forest.mechanics.stems import Stem
@@ -45,7 +46,8 @@ def _tree(of: Spruces) -> tuple[Stem, np.ndarray, np.ndarray]:
     length = of.height_m / n
     top = (np.arange(n) + 1.0) * length
     middle = top - 0.5 * length
-    radius = 0.5 * of.dbh_m * ((of.height_m - middle) / (of.height_m - 1.3)) ** 0.6
+    wood = of.dbh_m * (1.0 - SPRUCE.mensuration.bark_factor)
+    radius = 0.5 * wood * ((of.height_m - middle) / (of.height_m - 1.3)) ** 0.6
     depth = 0.4206 + 0.4368 * of.height_m
     width = 0.5824 + 11.5 * of.dbh_m
     section = width * length * np.clip((of.height_m - middle) / depth, 0.0, 1.0)
@@ -80,13 +82,19 @@ def _critical(of: Spruces, tree: int, *, periodic: bool) -> np.ndarray:
     stem, tip, shown = _tree(of)
     scratch = np.zeros((5, len(shown) + 1))
     scratch[0, :-1] = shown
+    drag, thick = np.zeros((n * n, LAYERS)), of.height_m / LAYERS
+    for area, height in zip(shown, stem.leaf_height, strict=True):
+        drag[:, layer_of(height, thick)] += SPRUCE.mechanics.drag_coefficient * area
+    density = canopies(np.ones(n * n, np.bool_), Crowns(thick, drag, drag), ways)
     row = n // 2 * n + tree
-    wind = (1.0, 0.0, of.height_m, found.share[row], found.attenuation[row])
+    exposed = (found.edge[row], found.gusts[row])
+    wind = (1.0, 0.0, of.height_m, thick, density[row], exposed)
     return np.array(
         critical_speeds(
             stem,
             tip,
             scratch,
+            np.zeros((3, LAYERS)),
             wind,
             SPRUCE.mechanics.drag_coefficient,
             1e6 * SPRUCE.mechanics.rupture_mpa,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from tests.reference.plant import Node
 from tests.reference.stems import G, Wood, leaf_area, load, moment, stem_of
 
 STRETCH, STRETCHES = 0.25, 80
+LAYERS, FRICTION = 32, 0.3
 
 
 def places(
@@ -40,8 +42,8 @@ def exposure(
     canopy: float,
     direction: float,
     plot: Plot,
-) -> list[tuple[float, float, float, float]]:
-    """Spacing, E, share at the canopy's top and attenuation of each tree; NaN for the fallen."""
+) -> list[tuple[float, float, float]]:
+    """Spacing, E and the gusts' moment per that far within, of each tree; NaN for the fallen."""
     everywhere = [place for place in places(x, y, canopy, plot) if standing[place[0]]]
     to = (math.cos(direction), math.sin(direction))
     spacing = [math.nan] * len(x)
@@ -59,7 +61,7 @@ def exposure(
     found = []
     for a in range(len(x)):
         if not standing[a]:
-            found.append((math.nan,) * 4)
+            found.append((math.nan,) * 3)
             continue
         cover = [0.0] * STRETCHES
         decay = [0.0] * STRETCHES
@@ -84,9 +86,8 @@ def exposure(
                 gap = STRETCH * (1.0 - 2.0 * share) + 10.0 * edge ** (1.0 / 0.3467)
                 edge = min(gap / 10.0, 1.0) ** 0.3467
             edge *= math.exp(decay[k] / max(share, 1.0))
-        load = gust_load(spacing[a] / canopy, edge) / gust_load(0.45, 1.0)
-        fall = 2.0 * (1.0 - edge)
-        found.append((spacing[a], edge, math.sqrt(load) * math.exp(0.25 * fall), fall))
+        gusts = gust_load(spacing[a] / canopy, edge) / gust_load(spacing[a] / canopy, 0.0)
+        found.append((spacing[a], edge, gusts))
     return found
 
 
@@ -101,80 +102,149 @@ def behind_an_edge(spacing: float, distance: float, gap: float) -> float:
     return (1.1127 * spacing + 0.0311) ** distance * (min(gap, 10.0) / 10.0) ** 0.3467
 
 
-def crown_shares(nodes: Sequence[Node], area: float, along: np.ndarray) -> list[float]:
-    """Area shown to the wind per area of the leaves, in 16 layers of a tree's height."""
-    top = max(0.0, *(node.tip[2] for node in nodes))
-    thick = max(top, 1e-3) / 16
-    sites: list[list[float]] = [[] for _ in range(16)]
+def crown_layers(
+    nodes: Sequence[Node], area: float, along: np.ndarray, thick: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Area shown to the wind per area of the leaves, and area shown, in layers of the canopy."""
+    sites: list[list[float]] = [[] for _ in range(LAYERS)]
     for node in nodes:
-        k = min(max(int(node.tip[2] / thick), 0), 15)
+        k = min(max(int(node.tip[2] / thick), 0), LAYERS - 1)
         sites[k] += [node.tip[1] * along[0] - node.tip[0] * along[1]] * node.buds
-    shares = []
-    for aside in sites:
-        if not aside:
-            shares.append(0.0)
+    shares, areas = np.zeros(LAYERS), np.zeros(LAYERS)
+    for k, aside in enumerate(sites):
+        if aside:
+            section = (4.0 * float(np.std(aside)) + math.sqrt(area)) * thick
+            areas[k] = section * (1.0 - math.exp(-0.5 * len(aside) * area / section))
+            shares[k] = areas[k] / (len(aside) * area)
+    return shares, areas
+
+
+def canopy(
+    x: Sequence[float],
+    y: Sequence[float],
+    drag: np.ndarray,
+    standing: Sequence[bool],
+    height: float,
+    direction: float,
+    plot: Plot,
+) -> np.ndarray:
+    """Crowns around each tree per ground, by layers; NaN for the fallen. All pairs, all images."""
+    to = (math.cos(direction), math.sin(direction))
+    density = np.full(drag.shape, math.nan)
+    for a in range(len(x)):
+        if not standing[a]:
             continue
-        section = (4.0 * float(np.std(aside)) + math.sqrt(area)) * thick
-        leaves = len(aside) * area
-        shares.append(section * (1.0 - math.exp(-0.5 * leaves / section)) / leaves)
-    return shares
+        near, behind, ahead = drag[a].copy(), np.zeros(LAYERS), np.zeros(LAYERS)
+        for b, there_x, there_y in places(x, y, height, plot):
+            dx, dy = there_x - x[a], there_y - y[a]
+            if standing[b] and 0.0 < math.hypot(dx, dy) <= 0.5 * height:
+                lee = dx * to[0] + dy * to[1]
+                (ahead if lee > 0.0 else behind if lee < 0.0 else near)[:] += drag[b]
+        more = ahead if ahead.sum() > behind.sum() else behind
+        density[a] = (near + 2.0 * more) / (math.pi * (0.5 * height) ** 2)
+    return density
+
+
+def streams(u: float) -> float:
+    """Share of a crown that faces a wind; Peltola et al. 1999."""
+    return 10.0 / min(max(u, 11.0), 20.0) - 0.1
+
+
+class Layer(NamedTuple):
+    """Wind in a layer, m/s, and its S(u) u^2 at a tree and far within, m2/s2."""
+
+    wind: float
+    here: float
+    inside: float
+
+
+def winds(
+    speed: float, height: float, thick: float, density: Sequence[float], edge: float
+) -> list[Layer]:
+    """The wind in the layers of a canopy, from the ground up, by the momentum that is left."""
+    found = []
+    left = 1.0  # of the momentum, which goes by the square of the wind
+    for k in reversed(range(LAYERS)):
+        z = (k + 0.5) * thick / height
+        above = math.log((z - 2 / 3) / 0.1) / math.log(10 / 3) if z > 1.0 else 1.0
+        shown = streams(speed * above * math.sqrt(left))
+        below = left * math.exp(-0.5 * shown * above**2 * density[k] / FRICTION**2)
+        mean = left
+        if below < left:
+            mean = (left - below) / math.log(left / below)
+        u = speed * above * math.sqrt(mean ** (1.0 - edge))
+        at_top = speed * above * math.sqrt(left ** (1.0 - edge))
+        found.append(Layer(u, streams(at_top) * u**2, shown * (speed * above) ** 2 * mean))
+        left = below
+    return found[::-1]
+
+
+def pressure(layers: Sequence[Layer], density: Sequence[float], gusts: float) -> list[float]:
+    """S(u) u^2 in each layer, so that the canopy's moment is `gusts` times that far within."""
+    inside = sum(
+        d * layer.inside * (k + 0.5)
+        for k, (d, layer) in enumerate(zip(density, layers, strict=True))
+    )
+    here = sum(
+        d * layer.here * (k + 0.5) for k, (d, layer) in enumerate(zip(density, layers, strict=True))
+    )
+    scale = gusts * inside / here if here > 0.0 else gusts
+    return [scale * layer.here for layer in layers]
+
+
+class Place(NamedTuple):
+    """Where a tree stands in a canopy."""
+
+    along: np.ndarray
+    height: float  # of the canopy, m
+    thick: float  # of a layer, m
+    density: Sequence[float]
+    edge: float
+    gusts: float
 
 
 def strain(
-    nodes: Sequence[Node],
-    of: Wood,
-    speed: float,
-    wind: tuple[np.ndarray, float, float],
-    drag: float,
-    gust: float,
+    nodes: Sequence[Node], of: Wood, speed: float, place: Place, drag: float, gust: float
 ) -> tuple[float, float]:
-    """Largest stress in the lower half of the stem, and moment at the ground.
-
-    `wind` is its heading, the canopy's height and the attenuation; `speed` is that at its top.
-    """
-    along, canopy, fall = wind
+    """Stress at breast height, and moment at the ground."""
     stem = stem_of(nodes)
-    shares = crown_shares(nodes, of.leaf_area, along)
-    thick = max(max(0.0, *(node.tip[2] for node in nodes)), 1e-3) / 16
+    shares, _ = crown_layers(nodes, of.leaf_area, place.along, place.thick)
+    layers = winds(speed, place.height, place.thick, place.density, place.edge)
+    pushes = pressure(layers, place.density, place.gusts)
     forces = []
     for k in range(len(stem)):
         area, height = leaf_area(stem, k, of)
-        if height < canopy:
-            u = speed * math.exp(-fall * (1.0 - height / canopy))
-        else:
-            u = speed * math.log((height / canopy - 2 / 3) / 0.1) / math.log(10 / 3)
-        shown = area * shares[min(max(int(height / thick), 0), 15)]
-        streams = 10.0 / min(max(u, 11.0), 20.0) - 0.1
-        forces.append(gust * 0.5 * 1.25 * drag * streams * shown * u**2)
-    still = [moment(nodes, k, of, forces, along) for k in range(len(stem))]
-    bent = swayed(nodes, of, still)
-    stress = 0.0
-    for k, node in enumerate(stem):
-        if k > 0 and stem[k - 1].tip[2] > stem[-1].tip[2] / 3:
-            break
-        stress = max(stress, 4.0 * bent[k] / (math.pi * of.radius(node) ** 3))
-    return stress, bent[0]
+        layer = min(max(int(height / place.thick), 0), LAYERS - 1)
+        forces.append(gust * 0.5 * 1.25 * drag * area * shares[layer] * pushes[layer])
+    bent = swayed(nodes, of, forces, place.along)
+    limit = min(1.3, stem[-1].tip[2] / 3.0)
+    feet = [0.0, *(node.tip[2] for node in stem[:-1])]
+    at = next((k - 1 for k in range(1, len(stem)) if feet[k] > limit), len(stem) - 1)
+    return 4.0 * bent[at] / (math.pi * of.radius(stem[at]) ** 3), bent[0]
 
 
-def swayed(nodes: Sequence[Node], of: Wood, still: Sequence[float]) -> list[float]:
-    """Moments at the feet of the stations, with those of the weight beside them; six rounds."""
+def swayed(
+    nodes: Sequence[Node], of: Wood, forces: Sequence[float], along: np.ndarray
+) -> list[float]:
+    """Moments at the feet of the stations, with those of the weight that the wind moves aside."""
     stem = stem_of(nodes)
-    bent = list(still)
-    for _ in range(6):
-        lean, place = 0.0, 0.0
-        feet, weights = [], []
-        for k, node in enumerate(stem):
-            mean = 0.5 * (bent[k] + (bent[k + 1] if k + 1 < len(stem) else 0.0))
-            turn = mean * node.length / of.rigidity(node)
-            feet.append(place)
-            upper = place + math.sin(min(lean + 0.5 * turn, 0.5 * math.pi)) * node.length
-            weights.append([(of.wood(node), 0.5 * (place + upper)), (load(stem, k, of)[0], upper)])
-            place, lean = upper, lean + turn
-        bent = [
-            still[k] + sum(G * m * (at - feet[k]) for pair in weights[k:] for m, at in pair)
-            for k in range(len(stem))
-        ]
-    return bent
+    calm = [0.0] * len(stem)
+    blown = [moment(nodes, k, of, forces, along) for k in range(len(stem))]
+    more = [m - moment(nodes, k, of, calm, along) for k, m in enumerate(blown)]
+    lean, place = 0.0, 0.0
+    feet, weights = [], []
+    for k, node in enumerate(stem):
+        mean = 0.5 * (more[k] + (more[k + 1] if k + 1 < len(stem) else 0.0))
+        turn = mean * node.length / of.rigidity(node)
+        feet.append(place)
+        middle = min(max(lean + 0.5 * turn, -0.5 * math.pi), 0.5 * math.pi)
+        upper = place + math.sin(middle) * node.length
+        weights.append([(of.wood(node), 0.5 * (place + upper)), (load(stem, k, of)[0], upper)])
+        place, lean = upper, lean + turn
+    return [
+        blown[k] + sum(G * m * (at - feet[k]) for pair in weights[k:] for m, at in pair)
+        for k in range(len(stem))
+    ]
 
 
 def anchor(nodes: Sequence[Node], of: Wood, turning: float) -> float:
