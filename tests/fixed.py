@@ -1,4 +1,4 @@
-"""Species that stay as they are: a test that hangs on how fast trees grow is moved by no new fit."""
+"""Species that stay as they are, for tests that hang on how fast trees grow: no fit moves them."""
 
 from __future__ import annotations
 

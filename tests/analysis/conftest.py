@@ -13,7 +13,7 @@ from forest.simulation import simulate
 
 DENSE_STAND = """
 title = "crowded pines among beeches"
-years = 50
+years = 40
 start_year = 1960
 seed = 3
 plot = { size_m = [10, 10], boundary = "periodic" }

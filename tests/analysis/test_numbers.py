@@ -25,7 +25,7 @@ from forest.measure.tables import buck_run, plot_of, sample_skeletons
 from forest.measure.taper import RINGS_READ, disc_diameters, taper_stems
 from forest.record.run import Run
 
-LAST = 2009
+LAST = 1999
 
 
 def _living_samples(run: Run) -> list[int]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,6 +14,8 @@ from forest.record.run import Run
 from forest.scenario import Scenario
 from forest.simulation import simulate
 from forest.stand import Stand
+from tests.analysis.conftest import DENSE_STAND
+from tests.fixed import fixed
 
 TWO_STOREYS = """
 title = "beeches under pines"
@@ -24,9 +28,11 @@ planting = { kind = "random", density_ha = 4000 }
 """
 
 
-def test_rings_widen_to_the_crown_and_keep_their_area_below_it(dense_run: Run):
+def test_rings_widen_to_the_crown_and_keep_their_area_below_it(tmp_path: Path):
     """Pressler: in stand-grown trees, from the discs below the crown and at its base."""
-    row = pressler.table(pressler.profiles(dense_run)).set_index("species").loc["pinus_sylvestris"]
+    crowded = fixed(DENSE_STAND, "years=45", "planting.density_ha=10000")  # long bare stems
+    with simulate(crowded, tmp_path / "run.h5") as run:
+        row = pressler.table(pressler.profiles(run)).set_index("species").loc["pinus_sylvestris"]
     assert row["trees"] >= 5
     assert row["rising"] > 0.9
     assert row["crown_per_breast"] > 1.2

@@ -107,7 +107,9 @@ def test_a_branch_that_goes_lets_the_others_rise() -> None:
 
 @pytest.mark.parametrize("bending", ["true", "false"])
 def test_sample_trees_are_read_back_as_they_stood(tmp_path: Path, bending: str) -> None:
-    scenario = fixed(TOML, *BENDING, f"mechanics.bending={bending}", "output.sample_trees={ids=[1, 4]}")
+    scenario = fixed(
+        TOML, *BENDING, f"mechanics.bending={bending}", "output.sample_trees={ids=[1, 4]}"
+    )
     simulate(scenario, tmp_path / "run.h5").close()
     stand = Stand(scenario)
     with open_run(tmp_path / "run.h5") as run:
@@ -175,7 +177,9 @@ def test_stability_rows() -> None:
 
 
 def test_wind_loads_stems_and_moves_nothing() -> None:
-    still, windy = (steps(Stand(fixed(TOML, f"mechanics={{wind_m_s={v}}}")), 5)[-1] for v in (0, 20))
+    still, windy = (
+        steps(Stand(fixed(TOML, f"mechanics={{wind_m_s={v}}}")), 5)[-1] for v in (0, 20)
+    )
     np.testing.assert_array_equal(
         still.tables["trees"]["height_m"], windy.tables["trees"]["height_m"]
     )
