@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
-from forest.growth.shoots import sprout
+from forest.growth.shoots import first_internode, sprout
 from forest.measure.trees import measure_trees
 from forest.trees import table
 from forest.yearbook import Event
@@ -119,7 +119,7 @@ def establish(stand: Stand, new: Newcomers, kind: str, traits: SpeciesTraits) ->
     stand.next_id += len(more.tree_id)
     stand.rows = table.append(stand.rows, more)
     rows = stand.rows
-    internode = np.array([s.architecture.internode_length_m for s in stand.species])
+    internode = np.array([first_internode(traits, k) for k in range(len(stand.species))])
     metamers = np.maximum(np.rint(new.height_m / internode[more.species]), 1.0).astype(np.int64)
     wanted = rows.size.astype(np.int64)
     wanted[first_row:] = metamers

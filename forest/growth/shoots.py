@@ -355,6 +355,14 @@ def extend(
 
 
 @njit
+def first_internode(traits, species):  # type: ignore[no-untyped-def]
+    """Length of the internodes of a new tree's stem, m; unvaried."""
+    return traits.of[species].internode_length * curve(
+        traits.curve_n, traits.curve_x, traits.curve_y, species, LENGTH_BY_ORDER, 0.0
+    )
+
+
+@njit
 def sprout(  # type: ignore[no-untyped-def]
     arena: Metamers, trees: Trees, first_row, heading, metamers, traits: SpeciesTraits, year: Year
 ):
@@ -370,9 +378,7 @@ def sprout(  # type: ignore[no-untyped-def]
     for row in range(first_row, len(trees.tree_id)):
         sp = trees.species[row]
         s = trees.start[row]
-        unit = traits.of[sp].internode_length * curve(
-            traits.curve_n, traits.curve_x, traits.curve_y, sp, LENGTH_BY_ORDER, 0.0
-        )
+        unit = first_internode(traits, sp)
         n = metamers[row - first_row]
         # typed as where shoots go on, so that numba compiles no second _add
         order, main, last = np.int64(0), np.bool_(True), np.uint8(255)
