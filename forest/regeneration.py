@@ -17,7 +17,7 @@ from forest.dynamics.regeneration.fecundity import mast_factors, seeds_borne
 from forest.dynamics.regeneration.recruits import Places, find_places
 from forest.dynamics.regeneration.sprouts import Stumps, no_stumps, sprout_cohorts
 from forest.dynamics.regeneration.traits import Traits
-from forest.environment.canopy import Canopy, through_layer
+from forest.environment.canopy import Canopy, through_layers
 from forest.establishment import Newcomers, establish
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Columns = dict[str, NDArray[Any]]
 
-#: What breaks or burns a stem and leaves a stump with living roots.
+#: What breaks or burns a stem, beside storms, and leaves a stump with living roots.
 _BREAKING = ("buckling", "fire")
 #: Bounds of the height classes of `/regeneration`, m.
 _LOW_M, _HIGH_M = 0.1, 0.5
@@ -119,7 +119,7 @@ class Regeneration:
         sprouts = sprout_cohorts(self._stumps, self.cells, of.sprout, seed=self._seed, year=year)
         tally.add("sprouts_ha", sprouts.species, sprouts.n)
         self._stumps = no_stumps()
-        broken = [death.row for death in deaths if death.cause in _BREAKING]
+        broken = [d.row for d in deaths if d.broken or d.cause in _BREAKING]
         self.note_stumps(grown, broken, measures)
 
         mast = mast_factors(self._seed, year, of.seed)
@@ -145,7 +145,7 @@ class Regeneration:
         light = self.cells.sum(self._voxel_cell, self._canopy.ground_light.ravel())
         voxels = self.cells.sum(self._voxel_cell, None)
         low = np.maximum(height, seedlings.HALF_HEIGHT_M)
-        needs = 1.0 / (_room(low, kind, self._traits) * self.cells.area)
+        needs = 1.0 / (seedlings.room(low, kind, self._traits.seedling) * self.cells.area)
         taken = self.cells.sum(at, needs)
         return Ground(light / voxels, taken, self._canopy.layer_transmission, self.cells.area)
 
@@ -163,7 +163,7 @@ class Regeneration:
         """Let seeds fall and germinate: a new cohort of a species in each cell where one does."""
         of = self._traits
         lai = seedlings.leaf_index(self.cohorts, of.seedling, self.cells.count, ground.area)
-        light = ground.light * through_layer(ground.transmission, lai)
+        light = ground.light * through_layers(ground.transmission, lai)
         new = []
         for k, dispersal in enumerate(self._dispersal):
             own = kind == k
@@ -171,7 +171,7 @@ class Regeneration:
             seeds = dispersal.fall(self.cells.sum(at[own], borne[own])) + rain
             tally.rows["seeds_ha"][k] = float(seeds.sum()) * self.cells.per_hectare()
             half = float(of.seedling.survival_light_half[k])
-            lives = seedlings.outlive_summer(light, half)
+            lives = seedlings.survival(light, half, 1.0)
             n = seedlings.germinate(
                 seeds * of.germination_share[k] * lives, seed=self._seed, kind=k, year=year
             )
@@ -268,14 +268,6 @@ class Regeneration:
         self.cohorts = Cohorts(*(np.array(arrays[f"cohort_{k}"]) for k in Cohorts._fields))
         self._stumps = Stumps(*(np.array(arrays[f"stump_{k}"]) for k in Stumps._fields))
         self._shade()
-
-
-def _room(
-    height: NDArray[np.float64], kind: NDArray[np.int64], traits: Traits
-) -> NDArray[np.float64]:
-    """Give the most plants of these heights on a square metre; see `cohorts.room`."""
-    of = traits.seedling
-    return np.asarray(of.density_1m_m2[kind] * height ** -of.density_exponent[kind])
 
 
 def _newcomers(cohorts: Cohorts, places: Places) -> Newcomers:

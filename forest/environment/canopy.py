@@ -87,12 +87,22 @@ def layers_above(frame: Any, iz: Any) -> Any:
     return lower, min(lower + 1, frame.top), share
 
 
-def through_layer(
-    transmission: NDArray[np.float64], lai: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Give the share of the light that a thin layer of some leaf area index lets through."""
-    steps = LAYER_STEP * np.arange(len(transmission))
-    return np.asarray(np.interp(lai, steps, transmission))
+@njit
+def through(transmission: Any, lai: Any) -> Any:
+    """Give the share of the light that a thin layer lets through, between the steps of its table."""
+    at = lai / LAYER_STEP
+    low = np.int64(min(at, len(transmission) - 2.0))
+    share = min(at - low, 1.0)
+    return transmission[low] + share * (transmission[low + 1] - transmission[low])
+
+
+@njit
+def through_layers(transmission: Any, lai: Any) -> Any:
+    """Give that share, float64, for an array of leaf area indices."""
+    found = np.empty(lai.size)
+    for k, one in enumerate(lai.flat):
+        found[k] = through(transmission, one)
+    return found.reshape(lai.shape)
 
 
 class Canopy:
@@ -120,7 +130,7 @@ class Canopy:
     Attributes
     ----------
     layer_transmission : float64 (n,)
-        What a thin layer of leaves lets through; see `through_layer`.
+        What a thin layer of leaves lets through; see `through_layers`.
     """
 
     def __init__(
@@ -200,7 +210,7 @@ class Canopy:
             depth += covered
         sweep(depth, self.rays, int(self.periodic), self.transmission, self.ground)
         if self._undergrowth is not None:  # half of the layer's own leaves, as everywhere in T
-            share = through_layer(self.layer_transmission, 0.5 * self._undergrowth)
+            share = through_layers(self.layer_transmission, 0.5 * self._undergrowth)
             self._on_plot(self.transmission[0])[...] *= share.astype(np.float32)
 
     def _on_plot(self, layer: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -230,5 +240,5 @@ class Canopy:
         """Mean T on the plot's floor, below all that grows there, 0 to 1."""
         if self._undergrowth is None:
             return float(self.ground_light.mean(dtype=np.float64))
-        share = through_layer(self.layer_transmission, self._undergrowth)
+        share = through_layers(self.layer_transmission, self._undergrowth)
         return float((self.ground_light * share).mean(dtype=np.float64))

@@ -63,6 +63,19 @@ def test_a_year_is_that_of_the_slow_twin(seed: int, area: float, threads: int) -
         assert getattr(cohorts, name) == pytest.approx(lists[name], rel=1e-9)
 
 
+def test_a_good_year_lets_seedlings_grow_no_taller_than_full_light() -> None:
+    heights, reserves = [], []
+    for factor in (0.5, 1.0, 10.0):
+        cohorts = random_cohorts(np.random.default_rng(1), 3, 9)
+        here = ground(np.ones(3), np.zeros(3), 1.0)
+        live_a_year(cohorts, here, SHIPPED.seedling, factor * EVERY_YEAR, seed=1, year=2001)
+        heights.append(cohorts.height)
+        reserves.append(cohorts.reserve.sum())
+    assert (heights[0] < heights[1]).all()
+    assert heights[1].tolist() == heights[2].tolist()
+    assert reserves[0] < reserves[1] < reserves[2]
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6))
 def test_no_cell_holds_more_than_its_room(seed: int) -> None:

@@ -80,7 +80,7 @@ def live_a_year(
         if here > least:
             response = (1 - math.exp(-c * (here - least))) / (1 - math.exp(-c * (1 - least)))
         which = cohorts["species"][k]
-        grown = h + most * response * factor[which]
+        grown = h + most * response * min(factor[which], 1.0)
         leaves = s["leaf_area_1m_m2"] * h**2
         gain = leaves * (s["light_use_kg_m2"] * here * factor[which] - s["leaf_cost_kg_m2"])
         kept = s["reserve_fraction"] * max(cohorts["reserve"][k] + gain, 0.0)

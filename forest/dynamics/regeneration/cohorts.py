@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.dynamics.regeneration.traits import SeedlingTraits
-from forest.environment.canopy import LAYER_STEP
+from forest.environment.canopy import through
 from forest.random import STREAM_GERMINATION, STREAM_ROOM, STREAM_SEEDLING, normals, uniforms
 
 _CHUNKS = 64
@@ -102,21 +102,13 @@ class Ground(NamedTuple):
 
 
 @njit
-def through(transmission: Any, lai: Any) -> Any:
-    """Give the share of the light that leaves let through, between the steps of its table."""
-    at = lai / LAYER_STEP
-    low = np.int64(min(at, len(transmission) - 2.0))
-    share = min(at - low, 1.0)
-    return transmission[low] + share * (transmission[low + 1] - transmission[low])
-
-
-@njit
 def survival(light: Any, half: Any, most: Any) -> Any:
     """Give the share of seedlings that survives a year: half of the most at the light `half`.
 
-    most / (1 + (half / L)^4): a tolerant species' half is low, and little below it all die.
+    most / (1 + (half / L)^4): a tolerant species' half is low, and little below it all die. Of
+    germinants the most is 1: what else kills them is in the share that germinates.
     """
-    ratio = half / max(light, 1e-9)
+    ratio = half / np.maximum(light, 1e-9)
     square = ratio * ratio
     return most / (1.0 + square * square)
 
@@ -189,7 +181,7 @@ def _year_of_cell(
         response = growth_response(
             light, traits.growth_light_least[kind], traits.growth_light_slope[kind]
         )
-        height += most * response * factor[kind]
+        height += most * response * min(factor[kind], 1.0)
         income = traits.light_use_kg_m2[kind] * light * factor[kind]
         gain = leaves * (income - traits.leaf_cost_kg_m2[kind])
         has = max(cohorts.reserve[k] + gain, 0.0)
@@ -258,7 +250,8 @@ def live_a_year(
     ground : Ground
     traits : SeedlingTraits
     income_factor : float64 (species,)
-        The year's factor on growth.
+        The year's factor on income. A good year or site adds nothing to the height growth of full
+        light, which is the most that a species has in it; a poor one takes from it.
     seed, year : int
         Seed of the scenario and calendar year, of which the draws are a function.
 
@@ -307,16 +300,6 @@ def germinate(
     n = np.zeros(len(expected), np.int64)
     in_threads(_germinate, expected, np.array([seed, kind, year], np.int64), n)
     return n
-
-
-def outlive_summer(light: NDArray[np.float64], half: float) -> NDArray[np.float64]:
-    """Give the share of germinants that outlive their first summer, of those that could.
-
-    The same curve as `survival`, with all alive in full light: what else kills them is in the share
-    that germinates.
-    """
-    ratio = half / np.maximum(light, 1e-9)
-    return np.asarray(1.0 / (1.0 + (ratio * ratio) ** 2))
 
 
 def leaf_index(cohorts: Cohorts, traits: SeedlingTraits, cells: int, area: float) -> Any:
