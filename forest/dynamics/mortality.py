@@ -34,11 +34,14 @@ class Death(NamedTuple):
         Its row of the tree table.
     kind, cause : str
         As in `/events`: one of `forest.record.schema.EVENT_KINDS` and of `CAUSES`.
+    broken : bool
+        Whether a storm broke its stem, and left the roots of its stump in the ground.
     """
 
     row: int
     kind: str
     cause: str
+    broken: bool = False
 
 
 class Hazards(NamedTuple):

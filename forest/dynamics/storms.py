@@ -92,9 +92,12 @@ class Storms:
         for storm in self.due(stand.year):
             spared = np.zeros(len(standing), np.bool_)
             spared[[death.row for death in deaths]] = True
-            fell = self._throw(stand, measures, storm, standing, spared)
+            outcome = self._throw(stand, measures, storm, standing, spared)
+            fell = np.flatnonzero(outcome != STOOD)
             standing[fell] = False
-            thrown += [Death(int(row), "windthrown", "wind") for row in fell]
+            thrown += [
+                Death(int(row), "windthrown", "wind", bool(outcome[row] == BROKEN)) for row in fell
+            ]
         return sorted([*deaths, *thrown])
 
     def due(self, year: int) -> list[Storm]:
@@ -108,13 +111,15 @@ class Storms:
 
     # ------------------------------------------------------------------ between years
 
-    def blow(self, stand: Stand, speed_m_s: float, direction_deg: float) -> NDArray[np.int64]:
+    def blow(
+        self, stand: Stand, speed_m_s: float, direction_deg: float, measures: TreeMeasures
+    ) -> NDArray[np.int8]:
         """Let a storm blow between two years; its rows of `/storms` come in the next record.
 
         Returns
         -------
-        int64 (k,)
-            Rows of the trees that fall, still in the table.
+        int8 (n,)
+            What becomes of each row of the table, as `STOOD`; the fallen are still in it.
 
         Raises
         ------
@@ -123,7 +128,7 @@ class Storms:
         """
         storm = Storm.of("Stand.blow", stand.year, speed_m_s, direction_deg)
         none = np.zeros(len(stand.rows.tree_id), np.bool_)
-        return self._throw(stand, stand.measure(), storm, ~none, none)
+        return self._throw(stand, measures, storm, ~none, none)
 
     def critical(self, stand: Stand, direction_deg: float) -> Columns:
         """Find the storms of a direction that the trees do not withstand; none falls."""
@@ -155,12 +160,12 @@ class Storms:
         storm: Storm,
         standing: NDArray[np.bool_],
         spared: NDArray[np.bool_],
-    ) -> NDArray[np.int64]:
-        """Blow once; note the rows of `/storms` and give the rows that fell."""
+    ) -> NDArray[np.int8]:
+        """Blow once; note the rows of `/storms` and give the outcome of every row."""
         due = self._due_rows(stand, measures) & standing & ~spared
         passed = self._pass(stand, due, standing.copy(), storm.speed_m_s, storm.direction_deg)
         self._note(stand, measures, storm, due, passed)
-        return np.flatnonzero(passed.outcome != STOOD)
+        return passed.outcome
 
     def _due_rows(self, stand: Stand, measures: TreeMeasures) -> NDArray[np.bool_]:
         """Rows that a storm may throw: tall enough, and not planted since the last year."""

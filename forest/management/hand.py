@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from forest.dynamics.storms import BROKEN, STOOD
 from forest.errors import InputError
 from forest.management import doing
 from forest.management.plan import Felling, Places, cuts_of, fill
@@ -133,9 +134,14 @@ class Hand:
             If there is no such storm.
         """
         stand = cast("Stand", self)
-        fallen = stand.storms.blow(stand, speed_m_s, direction_deg)
+        measures = stand.measure()
+        outcome = stand.storms.blow(stand, speed_m_s, direction_deg, measures)
+        fallen = np.flatnonzero(outcome != STOOD)
         ids: list[int] = stand.rows.tree_id[fallen].tolist()
-        doing.take_out(stand, fallen, "windthrown", "wind", stand.measure())
+        if stand.regeneration is not None:
+            broken = np.flatnonzero(outcome == BROKEN)
+            stand.regeneration.note_stumps(stand.rows, broken.tolist(), measures)
+        doing.take_out(stand, fallen, "windthrown", "wind", measures)
         return ids
 
     def critical_wind(self, direction_deg: float = 0.0) -> pd.DataFrame:

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from forest._threads import using_threads
+from forest.dynamics.storms import BROKEN, UPROOTED
+from forest.establishment import Newcomers, establish
+from forest.growth.parameters import species_traits
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run
 from forest.scenario import Scenario
@@ -171,6 +174,39 @@ def test_stumps_of_burnt_trees_sprout_a_year_later() -> None:
     assert len(burnt.tables["trees"]["tree_id"]) == 0
     assert burnt.tables["regeneration"]["sprouts_ha"].sum() == 0.0
     assert after.tables["regeneration"]["sprouts_ha"][1] > 0.0
+
+
+def test_stumps_of_wind_broken_trees_sprout() -> None:
+    """What a storm breaks leaves a stump; what it uproots does not: in the year and by hand."""
+    trees = [{"x_m": x + 0.5, "y_m": 4.0, "species": "quercus_robur"} for x in range(8)]
+    rest = {
+        "planting": {"kind": "explicit", "trees": trees},
+        "regeneration": {"handover_height_m": 1.5},
+    }
+    named = {"from_height_m": 0.1, "storms": [{"year": 2003, "speed_m_s": 100}]}
+    firm, loose = {"anchorage": 10.0}, {"anchorage": 0.001}
+    for soil, sprout in ((firm, True), (loose, False)):
+        stand = Stand(_scenario(**rest, wind={**named, **soil}))
+        storm, after = steps(stand, 4)[2:]
+        outcome = storm.tables["storms"]["outcome"]
+        assert (outcome == (BROKEN if sprout else UPROOTED)).all()
+        assert len(outcome) == 8
+        assert (after.tables["regeneration"]["sprouts_ha"][1] > 0.0) == sprout
+        by_hand = Stand(_scenario(**rest, wind={"from_height_m": 0.1, **soil}))
+        steps(by_hand, 3)
+        assert len(by_hand.blow(100.0)) == 8
+        assert (by_hand.step().tables["regeneration"]["sprouts_ha"][1] > 0.0) == sprout
+
+
+def test_recruits_have_their_height_where_stems_have_short_internodes() -> None:
+    short = {"internode_factor_by_order": [[0, 0.4], [1, 1.0]]}
+    stand = Stand(_scenario(species={"betula_pendula": {"architecture": short}}, regeneration=None))
+    upright = np.array([[0.0, 0.0, 1.0]])
+    one, none = np.ones(1), np.zeros(1, np.int64)
+    new = Newcomers(one, one, none, upright, 1.5 * one, none, none, one)
+    establish(stand, new, "recruited", species_traits(stand.species, paper=False))
+    unit = stand.species[0].architecture.internode_length_m
+    assert stand.measure().height_m[-1] == pytest.approx(1.5, abs=0.2 * unit)
 
 
 def test_succession_from_bare_ground() -> None:
