@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from forest._jit import announce_compiling
 from forest._threads import most_threads, using_threads
@@ -206,25 +206,38 @@ def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
 
     Each may choose its sample trees in its own last year.
     """
-    contents = []
-    for scenario in (one, other):
-        content = scenario.model_dump()
-        done = range(scenario.start_year, scenario.start_year + years_done)
-        content["acts"] = acts_so_far(scenario.acts, done)
-        deaths = content["mortality"]
-        deaths["events"] = [event for event in deaths["events"] if event["year"] in done]
-        wind = content["wind"]
-        if wind is not None:
-            wind["storms"] = [storm for storm in wind["storms"] if storm["year"] in done]
-        climate = content["climate"]
-        if not climate["repeat"]:  # a series may go on
-            climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]
-        last = scenario.start_year + content.pop("years") - 1
-        samples = content["output"]["sample_trees"]
-        if samples["at_year"] == last:
-            samples["at_year"] = None
-        contents.append(content)
-    return contents[0] == contents[1]
+    return _so_far(one, years_done) == _so_far(other, years_done)
+
+
+def _so_far(scenario: Scenario, years_done: int) -> dict[str, Any]:
+    """Tell what of a scenario the years that are done hang on."""
+    content = scenario.model_dump()
+    done = range(scenario.start_year, scenario.start_year + years_done)
+    content["acts"] = acts_so_far(scenario.acts, done)
+    deaths = content["mortality"]
+    deaths["events"] = _in_years(deaths["events"], done)
+    for event in deaths["events"]:
+        del event["source"]  # another file, or another line of it, kills the same trees
+    wind = content["wind"]
+    if wind is not None:
+        wind["storms"] = _in_years(wind["storms"], done)
+        if not wind["storms"] and wind["yearly"] is None:
+            content["wind"] = None  # nothing has blown yet
+    climate = content["climate"]
+    climate["extreme_years"] = _in_years(climate["extreme_years"], done)
+    if not climate["repeat"]:  # a series may go on
+        climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]
+    last = scenario.start_year + content.pop("years") - 1
+    samples = content["output"]["sample_trees"]
+    if samples["at_year"] == last:
+        samples["at_year"] = None
+    return content
+
+
+def _in_years(entries: Iterable[dict[str, Any]], years: range) -> list[dict[str, Any]]:
+    """Keep the entries of some years, by year; within one their order counts."""
+    kept = (entry for entry in entries if entry["year"] in years)
+    return sorted(kept, key=lambda entry: entry["year"])
 
 
 def _check_nothing_is_lost(out: Path) -> None:

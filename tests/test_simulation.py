@@ -132,6 +132,32 @@ def test_a_climate_may_go_on_when_a_run_is_resumed(tmp_path: Path) -> None:
         assert run.scenario == longer
 
 
+def test_a_lengthened_run_gets_storms_and_deaths_in_its_new_years(tmp_path: Path) -> None:
+    """The same deaths on other lines are the same; a storm that has blown cannot be had anew."""
+    out, deaths = tmp_path / "run.h5", tmp_path / "deaths.csv"
+    events, samples = f"mortality.events='{deaths}'", "output.sample_trees={}"
+
+    def storms(*years: int) -> str:
+        blown = ", ".join(f"{{year = {year}, speed_m_s = 100}}" for year in years)
+        return f"wind={{from_height_m = 0.1, storms = [{blown}]}}"
+
+    deaths.write_text("year,share,tree_id\n2003,0.2,\n2003,0.3,\n2002,,3\n")
+    simulate(tiny("years=4", events, samples), out).close()
+    dry = "climate.extreme_years=[{year = 2005, factor = 0.3}]"
+    for refused in (storms(2004), dry.replace("2005", "2004")):
+        with pytest.raises(InputError, match="different scenario.*deaths, storms and climate"):
+            simulate(tiny("years=6", events, refused, samples), out, resume=True)
+    deaths.write_text("year,share,tree_id\n\n2002,,3\n2003,0.3,\n2003,0.2,\n")
+    with pytest.raises(InputError, match="different scenario"):  # other trees are drawn
+        simulate(tiny("years=6", events, samples), out, resume=True)
+    deaths.write_text("year,share,tree_id\n\n2002,,3\n2003,0.2,\n2003,0.3,\n2005,0.1,\n")
+    longer = tiny("years=6", events, dry, storms(2006), samples)
+    with simulate(longer, out, resume=True) as run, simulate(longer, tmp_path / "b.h5") as whole:
+        assert_same_runs(run, whole)
+        assert run.scenario == longer
+        assert set(run.storms.year) == {2006}
+
+
 def test_resume_without_its_checkpoints_is_refused(tmp_path: Path) -> None:
     """Starting over would lose years that cannot be had back without growing them again."""
     out = tmp_path / "run.h5"
