@@ -114,14 +114,13 @@ def lay_ways(
     width = HALF_WIDTH * canopy_height
     low, high = (across.min() - width, across.max() + width) if len(x) else (0.0, 0.0)
     near, far = (along.min(), along.max()) if len(x) else (0.0, 0.0)
-    parts = []
-    for shift_x, shift_y in _images(canopy_height, plot):
-        u = along + (shift_x * to_x + shift_y * to_y)
-        v = across + (shift_y * to_x - shift_x * to_y)
-        seen = (v >= low) & (v <= high) & (u >= near - FETCH * canopy_height) & (u <= far + width)
-        rows = np.flatnonzero(seen)
-        parts.append((u[rows], v[rows], rows))
-    u, v, rows = (np.concatenate(column) for column in zip(*parts, strict=True))
+    first_u, last_u = near - FETCH * canopy_height, far + width
+    reach = ((first_u - far, last_u - near), (low - high, high - low))
+    shift_x, shift_y = _images((to_x, to_y), *reach, canopy_height, plot)
+    all_u = along + (shift_x * to_x + shift_y * to_y)[:, None]
+    all_v = across + (shift_y * to_x - shift_x * to_y)[:, None]
+    seen = (all_v >= low) & (all_v <= high) & (all_u >= first_u) & (all_u <= last_u)
+    u, v, rows = all_u[seen], all_v[seen], np.nonzero(seen)[1]
     strip = ((v - low) / width).astype(np.int64)
     order = np.lexsort((rows, u, strip))
     strips = int((high - low) / width) + 1
@@ -129,18 +128,40 @@ def lay_ways(
     return Ways(canopy_height, along, across, float(low), first, u[order], v[order], rows[order])
 
 
-def _images(canopy_height: float, plot: Plot) -> list[tuple[float, float]]:
-    """Shifts of a plot's images within reach of the wind, m."""
+def _images(
+    to: tuple[float, float],
+    along: tuple[float, float],
+    across: tuple[float, float],
+    canopy_height: float,
+    plot: Plot,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shifts, m, of a plot's images, at least of those that meet the strips along a wind.
+
+    `along` and `across` are the least and greatest shift, m, that brings a tree into them. On a
+    small plot under tall trees they meet one image in a hundred of those within reach.
+    """
     if not plot.periodic:
-        return [(0.0, 0.0)]
+        return np.zeros(1), np.zeros(1)
     reach = (FETCH + HALF_WIDTH) * canopy_height
     columns = int(np.ceil(reach / plot.width)) + 1
     lines = int(np.ceil(reach / plot.depth)) + 1
-    return [
-        (i * plot.width, j * plot.depth)
-        for i in range(-columns, columns + 1)
-        for j in range(-lines, lines + 1)
-    ]
+    column = np.arange(-columns, columns + 1)
+    first, last = np.full(len(column), -float(lines)), np.full(len(column), float(lines))
+    sides = (
+        (along, plot.width * to[0], plot.depth * to[1]),
+        (across, -plot.width * to[1], plot.depth * to[0]),
+    )
+    for (low, high), by_column, by_line in sides:
+        ends = np.array([[low], [high]]) - column * by_column
+        if abs(by_line) * lines < 1e-6:  # the images of a column lie beside one another
+            last[(ends[0] > 1e-5) | (ends[1] < -1e-5)] = -np.inf
+            continue
+        ends /= by_line
+        first = np.maximum(first, np.floor(ends.min(axis=0)) - 1.0)
+        last = np.minimum(last, np.ceil(ends.max(axis=0)) + 1.0)
+    count = np.maximum(last - first + 1.0, 0.0).astype(np.int64)
+    line = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count - first, count)
+    return np.repeat(column, count) * plot.width, line * plot.depth
 
 
 @njit

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from forest._threads import using_threads
-from forest.mechanics.fetch import Exposure, expose, lay_ways
+from forest.mechanics.fetch import Exposure, expose, heading, lay_ways
 from forest.mechanics.shelter import Plot
 from tests.reference import storms as slow
 
@@ -30,6 +30,23 @@ def test_exposure_against_all_pairs(seed: int, periodic: bool, n: int) -> None:
         again = expose(height, standing, lay_ways(x, y, canopy, direction, plot))
     for one, other in zip(found, again, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.integers(0, 4),
+    st.sampled_from([0.0, 90.0, 180.0, 270.0, 45.0, 1e-7]) | st.floats(0.0, 360.0),
+)
+@settings(max_examples=25, deadline=None)
+def test_ways_hold_every_image_that_meets_them(seed: int, n: int, direction: float) -> None:
+    """Against all images of small plots under tall trees, one by one."""
+    rng = np.random.default_rng(seed)
+    plot = Plot(rng.uniform(1.0, 9.0), rng.uniform(1.0, 9.0), periodic=True)
+    x, y = rng.uniform(0.0, plot.width, n), rng.uniform(0.0, plot.depth, n)
+    canopy = rng.uniform(0.5, 4.0)
+    ways = lay_ways(x, y, canopy, direction, plot)
+    found = sorted(zip(ways.other_along, ways.other_across, ways.other, strict=True))
+    assert found == sorted(slow.images(x, y, canopy, heading(direction), plot))
 
 
 def _rows(

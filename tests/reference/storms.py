@@ -250,3 +250,24 @@ def swayed(
 def anchor(nodes: Sequence[Node], of: Wood, turning: float) -> float:
     """Moment that uproots a tree, N m."""
     return turning * sum(of.wood(node) for node in stem_of(nodes))
+
+
+def images(
+    x: np.ndarray, y: np.ndarray, canopy: float, to: tuple[float, float], plot: Plot
+) -> list[tuple[float, float, int]]:
+    """Places along and across a wind, and rows, of all that may shelter: image by image."""
+    along, across = x * to[0] + y * to[1], y * to[0] - x * to[1]
+    found: list[tuple[float, float, int]] = []
+    if not len(x):
+        return found
+    low, high = across.min() - 0.5 * canopy, across.max() + 0.5 * canopy
+    near, far = along.min() - 20.0 * canopy, along.max() + 0.5 * canopy
+    columns, lines = (math.ceil(20.5 * canopy / size) + 1 for size in (plot.width, plot.depth))
+    for i in range(-columns, columns + 1):
+        for j in range(-lines, lines + 1):
+            dx, dy = i * plot.width, j * plot.depth
+            u = along + (dx * to[0] + dy * to[1])
+            v = across + (dy * to[0] - dx * to[1])
+            for row in np.flatnonzero((v >= low) & (v <= high) & (u >= near) & (u <= far)):
+                found.append((u[row], v[row], int(row)))
+    return found
