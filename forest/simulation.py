@@ -204,7 +204,7 @@ def _is_complete(scenario: Scenario, out: Path) -> bool:
 def _same_so_far(one: Scenario, other: Scenario, years_done: int) -> bool:
     """Compare two scenarios but for their years, and for acts, deaths, storms and climate to come.
 
-    Each may choose its sample trees in its own last year.
+    Each may choose its sample trees in its own last year, or in one to come.
     """
     return _so_far(one, years_done) == _so_far(other, years_done)
 
@@ -227,9 +227,9 @@ def _so_far(scenario: Scenario, years_done: int) -> dict[str, Any]:
     climate["extreme_years"] = _in_years(climate["extreme_years"], done)
     if not climate["repeat"]:  # a series may go on
         climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]
-    last = scenario.start_year + content.pop("years") - 1
+    del content["years"], content["planned_years"]
     samples = content["output"]["sample_trees"]
-    if samples["at_year"] == last:
+    if samples["at_year"] == scenario.calendar[-1] or samples["at_year"] not in done:
         samples["at_year"] = None
     return content
 

@@ -12,7 +12,6 @@ from forest.cli.shared import (
     ScenarioFile,
     Stopped,
     check_picture,
-    load,
     print_pairs,
     print_stand_table,
 )
@@ -66,15 +65,11 @@ def run(
             where=str(to),
             expected="a new path, --resume to go on with it, or --force to replace it",
         )
-    changes = list(overrides or [])
-    if years is not None:
-        changes.append(f"years={years}")
-    if seed is not None:
-        changes.append(f"seed={seed}")
-    asked = load(scenario, changes)
-
     from forest.progress import Bar
+    from forest.scenario import Scenario
     from forest.simulation import simulate
+
+    asked = Scenario.load(scenario, overrides or (), years=years, seed=seed)
 
     try:
         finished = simulate(
@@ -177,9 +172,10 @@ def check(scenario: ScenarioFile, overrides: Overrides = None) -> None:
 
         forest check my_stand.toml --set plot.boundary=open
     """
+    from forest.scenario import Scenario
     from forest.scenario.summary import summary
 
-    asked = load(scenario, overrides or [])
+    asked = Scenario.load(scenario, overrides or ())
     lines = summary(asked)
     if asked.planting.kind == "inventory":
         from forest.stand import Stand

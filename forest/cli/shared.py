@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
-
-if TYPE_CHECKING:
-    from forest.scenario import Scenario
 
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="The scenario.")]
 RunFile = Annotated[Path, typer.Argument(metavar="RUN.h5", help="A run file, finished or not.")]
@@ -21,13 +18,6 @@ Overrides = Annotated[
 
 class Stopped(Exception):
     """A run was stopped; typer would not let KeyboardInterrupt keep its message."""
-
-
-def load(path: Path, overrides: Sequence[str]) -> Scenario:
-    from forest.scenario import Scenario
-
-    scenario = Scenario.load(path)
-    return scenario.with_overrides(overrides) if overrides else scenario
 
 
 def print_pairs(pairs: Sequence[tuple[str, str]]) -> None:

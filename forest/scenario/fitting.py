@@ -41,14 +41,14 @@ def check_fit(scenario: Scenario) -> None:
     )
     shares = {name: use.share for name, use in scenario.species.items()}
     regular = isinstance(scenario.planting, Regular)
-    check_acts(scenario.acts, scenario.plot, shares, scenario.calendar, regular)
+    check_acts(scenario.acts, scenario.plot, shares, scenario.planned_calendar, regular)
     check_wind(scenario)
     check_mortality(
         scenario.mortality,
         mechanics=scenario.mechanics is not None,
         plot=scenario.plot,
         species=scenario.species,
-        years=scenario.calendar,
+        years=scenario.planned_calendar,
     )
 
 

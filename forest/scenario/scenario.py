@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,11 +34,12 @@ from forest.scenario.model import (
     StemMap,
 )
 from forest.scenario.mortality import Mortality
+from forest.scenario.overrides import Changes
 from forest.scenario.regeneration import Regeneration
 from forest.scenario.wind import Wind
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
-from forest.species.text import input_error, parse_toml, read_text, to_toml
+from forest.species.text import parse_toml, read_text, to_toml
 
 
 class Scenario(Table):
@@ -62,6 +61,14 @@ class Scenario(Table):
 
     title: str = quantity("", "what the run is about", unit="", max_length=1000)
     years: int = quantity(..., "years to simulate", unit="year", ge=1, le=10000)
+    planned_years: int | None = quantity(
+        None,
+        "years that were meant where fewer are grown, as by --years: acts, deaths and storms may "
+        "then be due in years that are not reached; filled in",
+        unit="year",
+        ge=1,
+        le=10000,
+    )
     start_year: int = quantity(
         2000, "first calendar year of growth", unit="year", ge=-20000, le=20000
     )
@@ -105,7 +112,9 @@ class Scenario(Table):
     def __init__(self, /, **fields: Any) -> None:
         self._fill(fields, where="", folder=Path.cwd())
 
-    def _fill(self, data: dict[str, Any], *, where: str, folder: Path) -> None:
+    def _fill(
+        self, data: dict[str, Any], *, where: str | Callable[[str], str], folder: Path
+    ) -> None:
         try:
             self.__pydantic_validator__.validate_python(
                 data, self_instance=self, context={"folder": folder}
@@ -116,14 +125,32 @@ class Scenario(Table):
         self._folder = folder
 
     @classmethod
-    def _build(cls, data: dict[str, Any], *, where: str, folder: Path) -> Scenario:
+    def _build(
+        cls, data: dict[str, Any], *, where: str | Callable[[str], str], folder: Path
+    ) -> Scenario:
         scenario = cls.__new__(cls)
         scenario._fill(data, where=where, folder=folder)
         return scenario
 
     @classmethod
-    def load(cls, path: str | Path) -> Scenario:
+    def load(
+        cls,
+        path: str | Path,
+        overrides: Iterable[str] = (),
+        *,
+        years: int | None = None,
+        seed: int | None = None,
+    ) -> Scenario:
         """Read a scenario file; files that it names are looked for beside it.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        overrides : iterable of str
+            Keys to change before the whole is checked; see `with_overrides`.
+        years, seed : int, optional
+            The same for these two.
 
         Raises
         ------
@@ -131,7 +158,13 @@ class Scenario(Table):
             If the file cannot be read or is not a valid scenario.
         """
         path = Path(path)
-        return cls.from_toml(read_text(path, where=path.name), where=path.name, folder=path.parent)
+        data = parse_toml(read_text(path, where=path.name), where=path.name)
+        changes = Changes(overrides, years=years, seed=seed)
+        return cls._build(
+            changes.apply(data),
+            where=lambda key: changes.place(key, path.name),
+            folder=path.parent,
+        )
 
     @classmethod
     def from_toml(cls, text: str, *, where: str = "scenario", folder: str | Path = ".") -> Scenario:
@@ -192,15 +225,15 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _samples_exist(self) -> Scenario:
         samples = self.output.sample_trees
-        last = self.start_year + self.years - 1
+        planned = self.planned_calendar
         if samples.at_year is None:
-            samples = samples.model_copy(update={"at_year": last})
+            samples = samples.model_copy(update={"at_year": self.calendar[-1]})
             self.__dict__["output"] = self.output.model_copy(update={"sample_trees": samples})
-        elif not self.start_year <= samples.at_year <= last:
+        elif samples.at_year not in planned:
             raise Refusal(
                 f"{samples.at_year} is not a year of the run",
                 key="output.sample_trees.at_year",
-                expected=f"a calendar year, {self.start_year} to {last}",
+                expected=f"a calendar year, {planned[0]} to {planned[-1]}",
             )
         planted = self._count_trees()
         for tree_id in samples.ids:
@@ -228,6 +261,12 @@ class Scenario(Table):
     def calendar(self) -> range:
         """The calendar years of the run."""
         return range(self.start_year, self.start_year + self.years)
+
+    @property
+    def planned_calendar(self) -> range:
+        """The calendar years in which something may be due; the last may be beyond the run."""
+        most = max(self.years, self.planned_years or 0)
+        return range(self.start_year, self.start_year + most)
 
     @property
     def species_list(self) -> tuple[Species, ...]:
@@ -294,6 +333,8 @@ class Scenario(Table):
     def with_overrides(self, overrides: Iterable[str]) -> Scenario:
         """Change keys and check the whole again, files included.
 
+        Where `years` are made fewer, acts, deaths and storms of later years are not reached.
+
         Parameters
         ----------
         overrides : iterable of str
@@ -304,10 +345,12 @@ class Scenario(Table):
         InputError
             If a key is unknown, a value is not allowed, or an override is not ``key=value``.
         """
-        data = _as_given(self._given)
-        for override in overrides:
-            _set(data, override)
-        return self._build(data, where="--set", folder=self._folder)
+        changes = Changes(overrides)
+        return self._build(
+            changes.apply(self._given),
+            where=lambda key: changes.place(key, ""),
+            folder=self._folder,
+        )
 
     def to_toml(self) -> str:
         """Write the complete scenario, species and positions included, as TOML."""
@@ -323,38 +366,3 @@ class Scenario(Table):
 
     def __hash__(self) -> int:
         return hash(self.digest())
-
-
-def _as_given(data: Any) -> Any:
-    """Copy the given tables, so that overrides change no other scenario."""
-    if isinstance(data, Mapping):
-        return {key: _as_given(value) for key, value in data.items()}
-    return copy.copy(data)
-
-
-def _set(data: dict[str, Any], override: str) -> None:
-    """Put one ``key.path=value`` into nested tables."""
-    path, sign, text = override.partition("=")
-    keys = [key.strip() for key in path.split(".")]
-    if not sign or not all(keys):
-        raise input_error(
-            f"{override!r} is not an override", where="--set", expected="key.path=value"
-        )
-    table = data
-    for depth, key in enumerate(keys[:-1]):
-        table = table.setdefault(key, {})
-        if not isinstance(table, dict):
-            raise input_error(
-                f"{'.'.join(keys[: depth + 1])!r} is not a table",
-                where=f"--set: {path}",
-                expected="the key of a table",
-            )
-    table[keys[-1]] = _override_value(text)
-
-
-def _override_value(text: str) -> Any:
-    try:
-        parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        return text
-    return parsed["value"] if len(parsed) == 1 else text

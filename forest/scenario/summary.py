@@ -79,8 +79,9 @@ def _mechanics(scenario: Scenario) -> str:
 def _mortality(scenario: Scenario) -> str:
     mortality = scenario.mortality
     causes = [key for key in ("age", "background", "buckling") if getattr(mortality, key)]
-    if mortality.events:
-        causes.append(f"{len(mortality.events)} disturbances")
+    events = [event for event in mortality.events if event.year in scenario.calendar]
+    if events:
+        causes.append(f"{len(events)} disturbances")
     kept = "; snags and dead wood" if mortality.snags else ""
     paper = scenario.mode == "paper"
     return (", ".join([*([] if paper else ["suppression"]), *causes]) or "none") + kept
@@ -98,8 +99,9 @@ def _wind(scenario: Scenario) -> str:
     wind = scenario.wind
     if wind is None:
         return "none"
-    parts = [f"{s.year} {s.speed_m_s:g} m/s" for s in wind.storms[:_MOST_STORMS]]
-    parts += [f"{len(wind.storms) - _MOST_STORMS} more"] if len(wind.storms) > _MOST_STORMS else []
+    storms = [storm for storm in wind.storms if storm.year in scenario.calendar]
+    parts = [f"{storm.year} {storm.speed_m_s:g} m/s" for storm in storms[:_MOST_STORMS]]
+    parts += [f"{len(storms) - _MOST_STORMS} more"] if len(storms) > _MOST_STORMS else []
     if wind.yearly is not None:
         parts.append(f"every year about {wind.yearly.mode_m_s:g} m/s")
     return ", ".join(parts) or "no storms"
@@ -107,7 +109,9 @@ def _wind(scenario: Scenario) -> str:
 
 def _acts(scenario: Scenario) -> str:
     """Name the acts in the order of their first years, or the first and last of many."""
-    acts = sorted(scenario.acts, key=lambda act: act.calendar_years(scenario.calendar)[0])
+    calendar = scenario.calendar
+    reached = [act for act in scenario.acts if act.calendar_years(calendar)]
+    acts = sorted(reached, key=lambda act: act.calendar_years(calendar)[0])
     named = [f"{act.in_words} {act.time_in_words}" for act in acts]
     if len(named) > _MOST_ACTS:
         named[_MOST_ACTS - 1 : -1] = [f"... ({len(acts)} in all)"]

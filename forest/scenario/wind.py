@@ -88,8 +88,8 @@ class Wind(Table):
 
 
 def check_wind(scenario: Scenario) -> None:
-    """Refuse storms in years that are not of the run."""
-    years = scenario.calendar
+    """Refuse storms in years for which the run was not meant."""
+    years = scenario.planned_calendar
     for i, storm in enumerate(scenario.wind.storms if scenario.wind else ()):
         if storm.year not in years:
             raise Refusal(

@@ -8,7 +8,7 @@ carries its unit, range and description; `describe` turns a model into rows for 
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 import annotated_types
@@ -94,10 +94,12 @@ def quantity(
 # --- messages ------------------------------------------------------------------------------
 
 
-def refusal(error: ValidationError, model: type[BaseModel], *, where: str) -> InputError:
+def refusal(
+    error: ValidationError, model: type[BaseModel], *, where: str | Callable[[str], str]
+) -> InputError:
     """Turn pydantic's report into one line about its first problem.
 
-    A misspelt key is named before the key that is missing because of it.
+    `where` names what was read, or tells the place of a key. A misspelt key is named before the key that is missing because of it.
     """
     problems = error.errors(include_url=False)
     first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
@@ -123,7 +125,9 @@ def refusal(error: ValidationError, model: type[BaseModel], *, where: str) -> In
     return input_error(what, where=_join(where, place.key), expected=place.expected or first["msg"])
 
 
-def _join(where: str, key: str) -> str:
+def _join(where: str | Callable[[str], str], key: str) -> str:
+    if callable(where):
+        return where(key)
     return f"{where}: {key}" if where and key else where or key
 
 
