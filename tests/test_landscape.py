@@ -196,3 +196,28 @@ def test_a_folder_that_is_no_sweep(tmp_path: Path):
         landscape(tmp_path)
     with pytest.raises(InputError, match="least_basal_area_m2ha: -1"):
         landscape(tmp_path, least_basal_area_m2ha=-1)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--csv", "plots.csv", "--totals", "no/years.csv"], "no/years.csv: cannot be written"),
+        (["--csv", "plots.csv", "--totals", "years.xls"], "unknown format '.xls'"),
+        (["--csv", "plots.csv", "--totals", "old.csv"], "old.csv: exists already"),
+        (["--csv", "plots.csv", "--totals", "./plots.csv"], "plots.csv: is asked for twice"),
+        (["--csv", "plots.csv", "--to", "plots.csv"], "plots.csv: unknown format '.csv'"),
+    ],
+)
+def test_all_targets_are_checked_before_any_is_written(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    says: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "old.csv").write_text("mine")
+    code, out, err = forest("landscape", folder, *words)
+    assert (code, out) == (2, "")
+    assert says in err
+    assert [path.name for path in tmp_path.iterdir()] == ["old.csv"]

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from forest.cli.shared import RunFile, check_picture, print_pairs, print_stand_table
+from forest.cli.shared import (
+    FRAME,
+    PICTURE,
+    RunFile,
+    check_picture,
+    check_targets,
+    print_pairs,
+    print_stand_table,
+)
 
 if TYPE_CHECKING:
     from forest.scenario import Scenario
@@ -118,8 +126,7 @@ def landscape(
     from forest.view.landscape_picture import draw_landscape
     from forest.view.landscape_table import landscape_table
 
-    if to is not None:
-        check_picture(to, force)
+    check_targets((to, PICTURE), (csv, FRAME), (totals, FRAME), force=force)
     found = read_landscape(folder, least_basal_area_m2ha=least_basal_area)
     Console().print(landscape_table(found, year))
     if csv is not None:
@@ -154,11 +161,9 @@ def picture(
     from forest.errors import InputError
     from forest.record.run import open_run
 
-    wanted = [path for path in (to, development) if path is not None]
-    if not wanted:
+    if to is None and development is None:
         raise InputError("nothing to draw", expected="--to FILE.png or --development FILE.png")
-    for path in wanted:
-        check_picture(path, force)
+    check_targets((to, PICTURE), (development, PICTURE), force=force)
     with open_run(run_file) as run:
         if development is not None:
             from forest.view.development import draw_development

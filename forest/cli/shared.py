@@ -15,6 +15,9 @@ Overrides = Annotated[
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a key; may be given often."),
 ]
 
+#: Suffixes of what commands write.
+PICTURE, FRAME = (".png",), (".csv", ".parquet")
+
 
 class Stopped(Exception):
     """A run was stopped; typer would not let KeyboardInterrupt keep its message."""
@@ -39,13 +42,32 @@ def print_stand_table(run: Any) -> None:
 
 def check_picture(path: Path, force: bool) -> None:
     """Refuse a picture's path before anything is drawn."""
+    check_targets((path, PICTURE), force=force)
+
+
+def check_targets(*targets: tuple[Path | None, tuple[str, ...]], force: bool) -> None:
+    """Refuse files of which one cannot be written, or two are one, before any is written.
+
+    Parameters
+    ----------
+    *targets : (path or None, tuple of str)
+        A file that is asked for, and the suffixes of which it must have one.
+    force : bool
+        Whether to replace what is there.
+    """
     from forest.errors import InputError, OutputError
 
-    if path.suffix.lower() != ".png":
-        raise InputError(
-            f"unknown format '{path.suffix}'", where=str(path), expected="a name that ends in .png"
-        )
-    if path.is_dir() or not path.parent.is_dir():
-        raise OutputError("cannot be written", where=str(path), expected="a file in a folder")
-    if path.exists() and not force:
-        raise InputError("exists already", where=str(path), expected="a new path, or --force")
+    seen: set[Path] = set()
+    for path, suffixes in targets:
+        if path is None:
+            continue
+        if path.suffix.lower() not in suffixes:
+            expected = f"a name that ends in {' or '.join(suffixes)}"
+            raise InputError(f"unknown format '{path.suffix}'", where=str(path), expected=expected)
+        if path.is_dir() or not path.parent.is_dir():
+            raise OutputError("cannot be written", where=str(path), expected="a file in a folder")
+        if path.exists() and not force:
+            raise InputError("exists already", where=str(path), expected="a new path, or --force")
+        if path.resolve() in seen:
+            raise InputError("is asked for twice", where=str(path), expected="a path for each")
+        seen.add(path.resolve())
