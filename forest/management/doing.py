@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,9 +163,25 @@ def felling_by_hand(stand: Stand, tree_ids: Sequence[int], cause: str) -> Fellin
     """Check trees and cause that were given in Python."""
     if cause not in CAUSES:
         raise InputError(f"unknown cause '{cause}', {nearest(cause, CAUSES)}", where="Stand.fell")
-    for tree_id in tree_ids:
-        stand.row_of(tree_id)
-    return Felling("fell", [int(i) for i in dict.fromkeys(tree_ids)], cause)
+    ids = whole_ids(tree_ids, "Stand.fell")
+    for tree_id in ids:
+        table.row_of(stand.rows, tree_id, where="Stand.fell")
+    return Felling("fell", list(dict.fromkeys(ids)), cause)
+
+
+def whole_ids(tree_ids: Iterable[int], where: str) -> list[int]:
+    """Check a list of tree ids that was given in Python; `where` names it in messages."""
+    if isinstance(tree_ids, str) or not isinstance(tree_ids, Iterable):
+        raise InputError(
+            f"{tree_ids!r} is no list", where=where, expected="a list of ids of living trees"
+        )
+    ids = list(tree_ids)
+    for one in ids:
+        if not isinstance(one, int | np.integer) or isinstance(one, bool):
+            raise InputError(
+                f"{one!r} is no tree id", where=where, expected="whole numbers, as stand.trees has"
+            )
+    return [int(one) for one in ids]
 
 
 def _note_loss(stand: Stand, row: int, serials: NDArray[np.int32]) -> None:

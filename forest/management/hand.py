@@ -20,6 +20,7 @@ from forest.scenario.model import Regular
 from forest.species.schema import Refusal
 from forest.species.text import input_error
 from forest.trees.pruning import choose_branches, find_cuts
+from forest.trees.table import row_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -250,7 +251,7 @@ class Hand:
         arena, trees, where = stand.arena.metamers, stand.rows, "Stand.prune"
         measures = stand.measure()
         if isinstance(tree_id, int | np.integer):
-            row = stand.row_of(int(tree_id))
+            row = row_of(stand.rows, int(tree_id), where=where)
             if metamer is None:
                 serials = choose_branches(arena, trees, row, Branches.of(where, **choice))
             elif choice:
@@ -264,7 +265,7 @@ class Hand:
                 serials = np.atleast_1d(np.asarray(metamer, np.int32))
             cuts = {int(tree_id): serials}
         else:
-            ids = {} if tree_id is None else {"tree_ids": tuple(int(i) for i in tree_id)}
+            ids = {} if tree_id is None else {"tree_ids": tuple(doing.whole_ids(tree_id, where))}
             given = {} if metamer is None else {"metamer": metamer}
             rule = Pruning.of(where, **ids, **given, **choice)
             with _one_line(where):
