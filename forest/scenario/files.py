@@ -72,6 +72,20 @@ def _check_header(file: str, line: int, header: list[str], columns: tuple[str, .
         raise Refusal(f"{file!r} line {line} names a column twice")
 
 
+def as_number(cell: str) -> float:
+    """Read a number as people write it; Python's own float also takes `1_000`."""
+    if "_" in cell:
+        raise ValueError(cell)
+    return float(cell)
+
+
+def as_whole_number(cell: str) -> int:
+    """Read a whole number as people write it."""
+    if "_" in cell:
+        raise ValueError(cell)
+    return int(cell)
+
+
 def _number(
     file: str,
     line: int,
@@ -80,7 +94,7 @@ def _number(
     limits: tuple[float, float] = (-_LIMIT_M, _LIMIT_M),
 ) -> float:
     try:
-        value = float(row[column])
+        value = as_number(row[column])
     except ValueError:
         value = math.nan
     low, high = limits
@@ -92,9 +106,17 @@ def _number(
     return value
 
 
-def read_rows(file: str, context: Any) -> list[tuple[int, dict[str, str]]]:
-    """Read the line number and the cells, by column, of every row of a CSV file."""
-    return list(_rows(file, context, ()))
+def read_rows(
+    file: str, context: Any, columns: tuple[str, ...]
+) -> list[tuple[int, dict[str, str]]]:
+    """Read the line number and the cells, by column, of every row of a CSV file.
+
+    `columns` must be there, and a row at least.
+    """
+    rows = list(_rows(file, context, columns))
+    if not rows:
+        raise Refusal(f"{file!r} holds no row", expected="at least one below its header")
+    return rows
 
 
 def read_stem_map(

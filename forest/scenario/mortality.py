@@ -15,15 +15,15 @@ from forest.species.schema import Refusal, Table, quantity, refusal
 
 #: Columns of a file of disturbances, and how their cells are read; a cell may be empty.
 _CELLS: dict[str, Callable[[str], Any]] = {
-    "year": int,
-    "tree_id": int,
-    "x_m": float,
-    "y_m": float,
-    "radius_m": float,
-    "share": float,
+    "year": files.as_whole_number,
+    "tree_id": files.as_whole_number,
+    "x_m": files.as_number,
+    "y_m": files.as_number,
+    "radius_m": files.as_number,
+    "share": files.as_number,
     "species": str,
-    "min_dbh_cm": float,
-    "max_dbh_cm": float,
+    "min_dbh_cm": files.as_number,
+    "max_dbh_cm": files.as_number,
     "cause": str,
 }
 
@@ -86,7 +86,8 @@ def _read(events: Any, info: ValidationInfo) -> Any:
     if not isinstance(events, str):
         return events
     return tuple(
-        _disturbance(events, line, row) for line, row in files.read_rows(events, info.context)
+        _disturbance(events, line, row)
+        for line, row in files.read_rows(events, info.context, ("year",))
     )
 
 
@@ -100,7 +101,7 @@ def _disturbance(file: str, line: int, row: dict[str, str]) -> Disturbance:
             try:
                 given[column] = _CELLS[column](cell)
             except ValueError:
-                kind = "whole number" if _CELLS[column] is int else "number"
+                kind = "whole number" if _CELLS[column] is files.as_whole_number else "number"
                 raise Refusal(
                     f"{label}, column {column!r}: {cell[:40]!r} is not allowed",
                     expected=f"a {kind}",

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from forest.species.schema import Refusal, Table, quantity
 
 _Place = Annotated[float, Field(ge=-10000, le=10000)]
 _Length = Annotated[float, Field(gt=0, le=10000)]
 
+#: A polygon no wider than this is a line.
+_LEAST_WIDTH_M = 1e-6
 #: On a periodic plot a region may reach so many edges of the plot.
 _MOST_EDGES = 3.0
 
@@ -68,6 +71,17 @@ class Polygon(Table):
     points_m: tuple[tuple[_Place, _Place], ...] = quantity(
         ..., "its corners in order", unit="m", min_length=3, max_length=10000
     )
+
+    @model_validator(mode="after")
+    def _has_area(self) -> Polygon:
+        x0, y0 = self.points_m[0]
+        sides = [(x - x0, y - y0) for x, y in self.points_m]
+        dx, dy = max(sides, key=lambda side: math.hypot(*side))
+        if max(abs(dx * y - dy * x) for x, y in sides) <= _LEAST_WIDTH_M * math.hypot(dx, dy):
+            raise Refusal(
+                "has no area", key="points_m", expected="corners that do not all lie on one line"
+            )
+        return self
 
 
 Region = Annotated[

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple, Self
@@ -52,6 +53,8 @@ class Condition(NamedTuple):
         try:
             name, sign, number = found.groups() if found else ("", "", "x")
             value = float(number)
+            if not math.isfinite(value):
+                raise ValueError(number)
         except ValueError:
             raise Refusal(
                 f"{text[:60]!r} is no trigger",

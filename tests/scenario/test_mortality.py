@@ -58,6 +58,9 @@ def test_nothing_but_suppression_by_default() -> None:
     ("row", "says"),
     [
         ("2003,2.5,,,,,,,,", "'deaths.csv' line 2, column 'tree_id': '2.5' is not.*whole number"),
+        ("2_003,1,,,,,,,,", "line 2, column 'year': '2_003' is not allowed; expected a whole number"),
+        ("2003,,1_0,1,1,,,,,", "line 2, column 'x_m': '1_0' is not allowed; expected a number"),
+        ("", "'deaths.csv' holds no row; expected at least one below its header"),
         ("2003,,a,,,,,,,", "line 2, column 'x_m': 'a' is not allowed; expected a number"),
         ("2003,,nan,1,1,,,,,", "line 2: x_m: nan"),
         ("2003,,,,,1.5,,,,", "line 2: share: 1.5 is not allowed; expected number, 0 to 1"),
@@ -98,6 +101,12 @@ def test_a_bad_row_is_named(tmp_path: Path, row: str, says: str) -> None:
 def test_refusals(tmp_path: Path, rules: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         load(tmp_path, CSV, rules)
+
+
+@pytest.mark.parametrize("text", ["", "\n", "share\n0.5\n"])
+def test_a_file_without_years_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputError, match=r"expected columns year$"):
+        load(tmp_path, text)
 
 
 def test_a_tree_dies_once(tmp_path: Path) -> None:

@@ -73,6 +73,12 @@ def test_rules_are_read_told_and_written(act: str, words: str) -> None:
         (f"{BELOW}, when='n_ha>1', from_year=2005, until_year=2004", "until_year: 2004 lies bef"),
         (f"{BELOW}, when='sdi above 900'", "acts[0].when: 'sdi above 900' is no trigger; expected"),
         (f"{BELOW}, when='sdi > 1e'", "'sdi > 1e' is no trigger"),
+        (f"{BELOW}, when='n_ha > 1e999'", "acts[0].when: 'n_ha > 1e999' is no trigger"),
+        (
+            "kind='harvest', method='gap', year=2003, "
+            "gap={kind='polygon', points_m=[[1, 1], [2, 2], [4, 4]]}",
+            "acts[0].gap.points_m: has no area; expected corners that do not all lie on one line",
+        ),
         (f"{BELOW}, when='sdj > 900'", "acts[0].when: unknown quantity 'sdj', did you mean 'sdi'?"),
         (f"{BELOW}, when='sdi > 900', when_species='oak'", "when_species: unknown species 'oak'"),
         ("kind='thin', year=2003, method='below'", "acts[0]: no target given"),
