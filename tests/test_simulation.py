@@ -145,7 +145,7 @@ def test_a_lengthened_run_gets_storms_and_deaths_in_its_new_years(tmp_path: Path
     simulate(tiny("years=4", events, samples), out).close()
     dry = "climate.extreme_years=[{year = 2005, factor = 0.3}]"
     for refused in (storms(2004), dry.replace("2005", "2004")):
-        with pytest.raises(InputError, match="different scenario.*deaths, storms and climate"):
+        with pytest.raises(InputError, match=r"different scenario.*deaths, storms and climate"):
             simulate(tiny("years=6", events, refused, samples), out, resume=True)
     deaths.write_text("year,share,tree_id\n\n2002,,3\n2003,0.3,\n2003,0.2,\n")
     with pytest.raises(InputError, match="different scenario"):  # other trees are drawn

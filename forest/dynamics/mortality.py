@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from forest.dynamics.draws import uniforms_of
 from forest.errors import ActError, InputError
 from forest.random import STREAM_DEATH, STREAM_DISTURBANCE
-from forest.trees.table import Trees, row_of
+from forest.trees.table import Trees, distances, row_of
 
 if TYPE_CHECKING:
     from forest.measure.trees import TreeMeasures
@@ -229,10 +229,8 @@ def _within(trees: Trees, event: Disturbance, ground: Ground) -> NDArray[np.bool
     """Tell which trees stand in a disturbance's patch, or all if it has none."""
     if event.x_m is None or event.y_m is None or event.radius_m is None:
         return np.ones(len(trees.tree_id), np.bool_)
-    away = [np.abs(trees.x - event.x_m), np.abs(trees.y - event.y_m)]
-    if ground.periodic:
-        away = [np.minimum(d, size - d) for d, size in zip(away, ground.size_m, strict=True)]
-    near: NDArray[np.bool_] = away[0] ** 2 + away[1] ** 2 <= event.radius_m**2
+    away = distances(trees.x, trees.y, event.x_m, event.y_m, *ground)
+    near: NDArray[np.bool_] = away <= event.radius_m
     return near
 
 

@@ -89,7 +89,7 @@ def layers_above(frame: Any, iz: Any) -> Any:
 
 @njit
 def through(transmission: Any, lai: Any) -> Any:
-    """Give the share of the light that a thin layer lets through, between the steps of its table."""
+    """Give the share of the light that a thin layer lets through, between its table's steps."""
     at = lai / LAYER_STEP
     low = np.int64(min(at, len(transmission) - 2.0))
     share = min(at - low, 1.0)

@@ -16,17 +16,10 @@ from numpy.typing import NDArray
 from forest.measure.density import reineke_sdi
 from forest.measure.stand import Plot
 from forest.random import STREAM_THINNING, uniforms
+from forest.trees.table import distances
 
 #: A density counts as reached if it is above the target by no more than this share.
 _CLOSE = 1e-9
-
-
-def distances(census: Census, plot: Plot, x_m: float, y_m: float) -> NDArray[np.float64]:
-    """Give distances of all trees to a point, m; they wrap on a periodic plot."""
-    dx, dy = np.abs(census.x - x_m), np.abs(census.y - y_m)
-    if plot.periodic:
-        dx, dy = np.minimum(dx, plot.size_m[0] - dx), np.minimum(dy, plot.size_m[1] - dy)
-    return np.asarray(np.hypot(dx, dy))
 
 
 class Census(NamedTuple):
@@ -63,6 +56,12 @@ class Census(NamedTuple):
             for tree_id in self.tree_id[rows]
         ]
         return rows[np.lexsort((self.tree_id[rows], np.array(draw, np.float64)))]
+
+
+def _away(row: int, census: Census, plot: Plot) -> NDArray[np.float64]:
+    """Give distances of all trees to one of them, m."""
+    place = census.x[row], census.y[row]
+    return distances(census.x, census.y, *place, plot.size_m, plot.periodic)
 
 
 def density_left(
@@ -206,7 +205,7 @@ def spaced(
         chosen.append(int(row))
         sum_m2 += float(ground[row])
         if spacing_m > 0.0:
-            free &= distances(census, plot, census.x[row], census.y[row]) >= spacing_m
+            free &= _away(row, census, plot) >= spacing_m
     return np.array(chosen, np.int64)
 
 
@@ -248,7 +247,7 @@ def competitors(
     may[crop] = False
     strongest_of = []
     for row in crop:
-        away = distances(census, plot, census.x[row], census.y[row])
+        away = _away(row, census, plot)
         near = np.flatnonzero(may & (away <= within_m))
         strength = census.dbh_cm[near] / np.maximum(away[near], 1e-6)
         ranked = near[np.lexsort((census.tree_id[near], -strength))[:count]].tolist()

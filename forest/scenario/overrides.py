@@ -1,4 +1,4 @@
-"""Keys that are changed beside a scenario's file: ``--set key.path=value``, ``--years``, ``--seed``.
+"""Keys that are changed beside a scenario's file: ``--set``, ``--years`` and ``--seed``.
 
 They act before the scenario is checked, so that the whole is judged as it will run.
 """

@@ -99,7 +99,8 @@ def refusal(
 ) -> InputError:
     """Turn pydantic's report into one line about its first problem.
 
-    `where` names what was read, or tells the place of a key. A misspelt key is named before the key that is missing because of it.
+    `where` names what was read, or tells the place of a key. A misspelt key is named before the
+    key that is missing because of it.
     """
     problems = error.errors(include_url=False)
     first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])

@@ -111,6 +111,21 @@ def have_grown(trees: Trees, metamers: Metamers, steps: int) -> NDArray[np.bool_
     return grown
 
 
+def distances(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    x_m: float,
+    y_m: float,
+    size_m: tuple[float, float],
+    periodic: bool,
+) -> NDArray[np.float64]:
+    """Give distances of places on a plot to one of them, m; they wrap on a periodic plot."""
+    dx, dy = np.abs(x - x_m), np.abs(y - y_m)
+    if periodic:
+        dx, dy = np.minimum(dx, size_m[0] - dx), np.minimum(dy, size_m[1] - dy)
+    return np.asarray(np.hypot(dx, dy))
+
+
 def row_of(trees: Trees, tree_id: int, *, where: str) -> int:
     """Find the row of a living tree; `where` names the act that asks for it in messages.
 

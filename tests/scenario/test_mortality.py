@@ -58,7 +58,10 @@ def test_nothing_but_suppression_by_default() -> None:
     ("row", "says"),
     [
         ("2003,2.5,,,,,,,,", "'deaths.csv' line 2, column 'tree_id': '2.5' is not.*whole number"),
-        ("2_003,1,,,,,,,,", "line 2, column 'year': '2_003' is not allowed; expected a whole number"),
+        (
+            "2_003,1,,,,,,,,",
+            "line 2, column 'year': '2_003' is not allowed; expected a whole number",
+        ),
         ("2003,,1_0,1,1,,,,,", "line 2, column 'x_m': '1_0' is not allowed; expected a number"),
         ("", "'deaths.csv' holds no row; expected at least one below its header"),
         ("2003,,a,,,,,,,", "line 2, column 'x_m': 'a' is not allowed; expected a number"),
