@@ -160,9 +160,7 @@ def _images(
         first = np.maximum(first, np.floor(ends.min(axis=0)) - 1.0)
         last = np.minimum(last, np.ceil(ends.max(axis=0)) + 1.0)
     count = np.maximum(last - first + 1.0, 0.0).astype(np.int64)
-    line = np.arange(count.sum()) - np.repeat(
-        np.cumsum(count) - count - first, count
-    )
+    line = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count - first, count)
     shift_x, shift_y = np.repeat(column, count) * plot.width, line * plot.depth
     return np.asarray(shift_x, np.float64), np.asarray(shift_y, np.float64)
 
