@@ -29,7 +29,7 @@ from forest.measure.rings import RingYear, remember_discs
 from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
-from forest.regeneration import Regeneration
+from forest.renewal import Regeneration
 from forest.scenario.inventory import Inventory
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
