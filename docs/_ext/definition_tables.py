@@ -3,7 +3,7 @@
 `{scenario-keys}` and `{species-keys}` list every key with unit, default, range and meaning;
 `{species-values}` sets the shipped species side by side, `{species-sources}` says where the values
 come from. `{run-file-columns}` lists the tables of the run file, `{interop-columns}` what they give
-to other programs. `{pictures}` shows the gallery.
+to other programs. `{parametric-keys}` lists the parameters of parametric trees. `{pictures}` shows the gallery.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from sphinx.util.docutils import SphinxDirective
 
 import forest
 from forest.interop.mapping import mapping_markdown
+from forest.parametric.parameters import PAPER_LEVEL_NAMES, PAPER_NAMES, Parameters
 from forest.record.schema import columns_markdown
 from forest.scenario import Scenario
 from forest.species import Species, describe, load_species, species_names
@@ -84,6 +85,27 @@ def sources() -> str:
     return text
 
 
+def parametric_keys() -> str:
+    """List the parameters of a parametric tree with the paper's names."""
+    paper = {key: name for name, key in PAPER_NAMES.items()}
+    paper |= {f"level[].{key}": f"n{name}" for name, key in PAPER_LEVEL_NAMES.items()}
+    rows = [
+        [
+            f"`{row.key}`",
+            f"`{paper[row.key]}`" if row.key in paper else "",
+            row.type,
+            "" if row.unit == "1" else row.unit,
+            f"`{row.default}`" if row.default else "",
+            row.range,
+            row.description,
+        ]
+        for row in describe(Parameters)
+        if row.key != "level"
+    ]
+    header = ["key", "paper", "type", "unit", "default", "range", "meaning"]
+    return markdown_table(header, rows)
+
+
 def pictures() -> str:
     """Show every picture that `gallery/captions.toml` has a caption for, in its order."""
     folder = Path(__file__).parents[1] / "gallery"
@@ -113,7 +135,7 @@ def _short(value: Any) -> str:
 def _directive(text: Any) -> type[SphinxDirective]:
     class Generated(SphinxDirective):
         def run(self) -> list[nodes.Node]:
-            for room in ("scenario", "species", "record", "interop"):
+            for room in ("scenario", "species", "record", "interop", "parametric"):
                 for source in (Path(forest.__file__).parent / room).glob("*.*"):
                     self.env.note_dependency(str(source))
             self.env.note_dependency(str(Path(__file__).parents[1] / "gallery" / "captions.toml"))
@@ -132,5 +154,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("species-sources", _directive(sources))
     app.add_directive("run-file-columns", _directive(columns_markdown))
     app.add_directive("interop-columns", _directive(mapping_markdown))
+    app.add_directive("parametric-keys", _directive(parametric_keys))
     app.add_directive("pictures", _directive(pictures))
     return {"parallel_read_safe": True}

@@ -16,6 +16,7 @@ from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
 from forest.cli.measuring import bucking, measure
+from forest.cli.planting import tree
 from forest.cli.reading import info, landscape, picture, stability, table
 from forest.cli.ringing import rings
 from forest.cli.shared import Stopped
@@ -52,6 +53,7 @@ for _command in (
     export,
     species,
     picture,
+    tree,
     version,
 ):
     app.command()(_command)

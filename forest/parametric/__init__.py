@@ -1,0 +1,24 @@
+"""Trees that were not simulated: the model of Weber & Penn (1995) from parameters to a `Skeleton`."""
+
+from forest.parametric.growing import grow, grow_many
+from forest.parametric.parameters import (
+    Level,
+    Parameters,
+    from_paper,
+    load_parameters,
+    parametric_names,
+)
+from forest.parametric.tree import Nodes, ParametricTree, Stems
+
+__all__ = [
+    "Level",
+    "Nodes",
+    "Parameters",
+    "ParametricTree",
+    "Stems",
+    "from_paper",
+    "grow",
+    "grow_many",
+    "load_parameters",
+    "parametric_names",
+]

@@ -1,0 +1,176 @@
+"""What stems bear: the origins of the next level's stems, and leaves (Weber & Penn 1995, 4.3, 4.5, 4.9).
+
+Children stand at even distances along the course of a family, from the bare base up; a clone
+bears those of its own part.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from forest._jit import njit
+from forest.parametric.frames import load_frame, turn_about, turn_x, turn_y, turn_z
+from forest.parametric.ratios import shape_ratio
+from forest.parametric.stems import OF_CHILD, OF_LEAF, descend, draw, either, sections_of
+
+_DEGREE = np.pi / 180.0
+
+
+@njit
+def child_count(number: Any, most: Any, leaves: Any, shoots: Any, i: Any) -> Any:
+    """Children on the whole course of stem i of level `number`, to the nearest whole one (4.3, 4.5)."""
+    if number == 0:
+        share = 1.0
+    elif leaves:
+        share = 0.5 + 0.5 * shoots.reach[i]
+    elif number == 1:
+        share = 0.2 + 0.8 * shoots.share[i]
+    else:
+        share = 1.0 - 0.5 * shoots.reach[i]
+    return np.int64(np.floor(most * share + 0.5))
+
+
+@njit
+def first_child(count: Any, bare: Any, from_z: Any) -> Any:
+    """Number of the first child at or above z, of `count` from the bare base to the end."""
+    return max(np.int64(0), np.int64(np.ceil((from_z - bare) / (1.0 - bare) * count - 0.5)))
+
+
+@njit
+def bare_share(number: Any, tree: Any, length: Any, scale: Any) -> Any:
+    """Share of a stem that bears nothing: the trunk's base (BaseSize * scale, in metres)."""
+    return min(tree.base_size * scale / length, 0.999) if number == 0 else 0.0
+
+
+@njit
+def count_children(number: Any, tree: Any, levels: Any, scale: Any, most: Any, leaves: Any, shoots: Any) -> Any:
+    """Count what all stems of a level bear."""
+    total = np.int64(0)
+    for i in range(len(shoots.key)):
+        count = child_count(number, most, leaves, shoots, i)
+        bare = bare_share(number, tree[0], shoots.length[i], scale)
+        total += max(
+            0, count - first_child(count, bare, shoots.start[i] / levels[number].segments)
+        )
+    return total
+
+
+@njit
+def around(level: Any, j: Any, u: Any, turned: Any) -> Any:
+    """Turn about the parent of child j, given its predecessor's; radians (4.3)."""
+    chance = either(u) * level.rotate_variation
+    if level.rotate >= 0.0:
+        return turned + (level.rotate + chance) * _DEGREE
+    side = 1.0 if j % 2 == 0 else -1.0
+    return side * (180.0 + level.rotate + chance) * _DEGREE
+
+
+@njit
+def down_angle(level: Any, ratio: Any, u: Any) -> Any:
+    """Angle between child and parent, radians (4.3); `ratio` is 0 at the parent's top."""
+    if level.down_angle_variation >= 0.0:
+        return (level.down_angle + either(u) * level.down_angle_variation) * _DEGREE
+    return (level.down_angle + level.down_angle_variation * (1.0 - 2.0 * (0.2 + 0.8 * ratio))) * _DEGREE
+
+
+@njit
+def stand_at(number: Any, level: Any, tree: Any, shoots: Any, sections: Any, i: Any, z: Any, f: Any, place: Any) -> Any:
+    """Put a frame and place on stem i at z; gives the node below."""
+    total = np.int64(level.segments) * sections_of(level, tree, number)
+    along = (z - shoots.start[i] / level.segments) * total
+    k = min(max(np.int64(along), np.int64(0)), np.int64(shoots.nodes[i]) - 2)
+    node = np.int64(shoots.first[i]) + k
+    load_frame(f, sections.side, sections.heading, node)
+    place[:] = sections.position[node] + (along - k) * shoots.length[i] / total * f[6:9]
+    return node
+
+
+@njit
+def spring(
+    number: Any, tree: Any, levels: Any, whole: Any, shoots: Any, sections: Any, before: Any, out: Any
+) -> None:
+    """Fill the origins of the next level; `before` = stems and nodes of the levels below this one.
+
+    Nodes of `shoots` and `sections` are counted from this level's first.
+    """
+    t, parent, level = tree[0], levels[number], levels[number + 1]
+    f, place = np.empty(9), np.empty(3)
+    row = np.int64(0)
+    for i in range(len(shoots.key)):
+        length = shoots.length[i]
+        bare = bare_share(number, t, length, whole.scale)
+        count = child_count(number, level.branches, False, shoots, i)
+        first = first_child(count, bare, shoots.start[i] / parent.segments)
+        turned = level.rotate * first * _DEGREE
+        for j in range(first, count):
+            z = bare + (1.0 - bare) * (j + 0.5) / count
+            a, b, c, _ = draw(whole.seed, shoots.key[i], OF_CHILD + j)
+            node = stand_at(number, parent, t, shoots, sections, i, z, f, place)
+            ratio = (1.0 - z) / (1.0 - bare)
+            turned = around(level, j, a, turned)
+            turn_z(f, turned)
+            turn_x(f, down_angle(level, ratio, b))
+            most = max(0.0, level.length + either(c) * level.length_variation)
+            if number == 0:
+                shape = shape_ratio(
+                    np.int64(t.shape), ratio, t.prune_width_peak, t.prune_power_low,
+                    t.prune_power_high, whole.printed,
+                )  # fmt: skip
+                out.length[row] = length * most * shape
+            else:
+                out.length[row] = most * length * (1.0 - 0.6 * z)
+            frac = (z - sections.z[node]) / (sections.z[node + 1] - sections.z[node])
+            out.limit[row] = (1.0 - frac) * sections.radius[node] + frac * sections.radius[node + 1]
+            out.position[row], out.heading[row], out.side[row] = place, f[6:9], f[0:3]
+            out.longest[row] = most * length
+            out.parent_length[row], out.parent_radius[row] = length, shoots.radius[i]
+            out.offset[row] = z * length
+            out.parent[row], out.node[row] = before[0] + i, before[1] + node
+            out.key[row] = descend(whole.seed, shoots.key[i], OF_CHILD + j)
+            row += 1
+
+
+@njit
+def orient(f: Any, place: Any, bend: Any) -> None:
+    """Turn a leaf's upper face (the frame's y) outwards and up (4.9)."""
+    outward = np.arctan2(place[1], place[0]) - np.arctan2(f[4], f[3])
+    turn_about(f, 0.0, 0.0, 1.0, bend * outward, np.int64(9))
+    flat = np.sqrt(f[3] * f[3] + f[4] * f[4])
+    if flat > 0.0:
+        angle = bend * np.arctan2(flat, f[5])
+        turn_about(f, f[4] / flat, -f[3] / flat, 0.0, angle, np.int64(9))
+
+
+@njit
+def bear_leaves(
+    number: Any, tree: Any, levels: Any, whole: Any, shoots: Any, sections: Any, before: Any, most: Any, out: Any
+) -> None:
+    """Fill the leaves of the last level's stems; `out` = (position, direction, normal, stem, node)."""
+    t, parent, level = tree[0], levels[number], levels[number + 1]
+    position, direction, normal, stem, at_node = out
+    f, place = np.empty(9), np.empty(3)
+    row = np.int64(0)
+    for i in range(len(shoots.key)):
+        bare = bare_share(number, t, shoots.length[i], whole.scale)
+        count = child_count(number, most, True, shoots, i)
+        first = first_child(count, bare, shoots.start[i] / parent.segments)
+        turned = level.rotate * first * _DEGREE
+        for j in range(first, count):
+            z = bare + (1.0 - bare) * (j + 0.5) / count
+            a, b, _, _ = draw(whole.seed, shoots.key[i], OF_LEAF + j)
+            node = stand_at(
+                number, parent, t, shoots, sections, i, 1.0 if t.leaves < 0.0 else z, f, place
+            )
+            if t.leaves < 0.0:
+                turn_y(f, ((j + 0.5) / count - 0.5) * level.rotate * _DEGREE)
+            else:
+                turned = around(level, j, a, turned)
+                turn_z(f, turned)
+            turn_x(f, down_angle(level, (1.0 - z) / (1.0 - bare), b))
+            if t.leaf_bend > 0.0:
+                orient(f, place, t.leaf_bend)
+            position[row], direction[row], normal[row] = place, f[6:9], f[3:6]
+            stem[row], at_node[row] = before[0] + i, before[1] + node
+            row += 1
