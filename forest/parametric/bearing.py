@@ -45,15 +45,15 @@ def bare_share(number: Any, tree: Any, length: Any, scale: Any) -> Any:
 
 
 @njit
-def count_children(number: Any, tree: Any, levels: Any, scale: Any, most: Any, leaves: Any, shoots: Any) -> Any:
+def count_children(
+    number: Any, tree: Any, levels: Any, scale: Any, most: Any, leaves: Any, shoots: Any
+) -> Any:
     """Count what all stems of a level bear."""
     total = np.int64(0)
     for i in range(len(shoots.key)):
         count = child_count(number, most, leaves, shoots, i)
         bare = bare_share(number, tree[0], shoots.length[i], scale)
-        total += max(
-            0, count - first_child(count, bare, shoots.start[i] / levels[number].segments)
-        )
+        total += max(0, count - first_child(count, bare, shoots.start[i] / levels[number].segments))
     return total
 
 
@@ -72,11 +72,23 @@ def down_angle(level: Any, ratio: Any, u: Any) -> Any:
     """Angle between child and parent, radians (4.3); `ratio` is 0 at the parent's top."""
     if level.down_angle_variation >= 0.0:
         return (level.down_angle + either(u) * level.down_angle_variation) * _DEGREE
-    return (level.down_angle + level.down_angle_variation * (1.0 - 2.0 * (0.2 + 0.8 * ratio))) * _DEGREE
+    return (
+        level.down_angle + level.down_angle_variation * (1.0 - 2.0 * (0.2 + 0.8 * ratio))
+    ) * _DEGREE
 
 
 @njit
-def stand_at(number: Any, level: Any, tree: Any, shoots: Any, sections: Any, i: Any, z: Any, f: Any, place: Any) -> Any:
+def stand_at(
+    number: Any,
+    level: Any,
+    tree: Any,
+    shoots: Any,
+    sections: Any,
+    i: Any,
+    z: Any,
+    f: Any,
+    place: Any,
+) -> Any:
     """Put a frame and place on stem i at z; gives the node below."""
     total = np.int64(level.segments) * sections_of(level, tree, number)
     along = (z - shoots.start[i] / level.segments) * total
@@ -89,7 +101,14 @@ def stand_at(number: Any, level: Any, tree: Any, shoots: Any, sections: Any, i: 
 
 @njit
 def spring(
-    number: Any, tree: Any, levels: Any, whole: Any, shoots: Any, sections: Any, before: Any, out: Any
+    number: Any,
+    tree: Any,
+    levels: Any,
+    whole: Any,
+    shoots: Any,
+    sections: Any,
+    before: Any,
+    out: Any,
 ) -> None:
     """Fill the origins of the next level; `before` = stems and nodes of the levels below this one.
 
@@ -145,7 +164,15 @@ def orient(f: Any, place: Any, bend: Any) -> None:
 
 @njit
 def bear_leaves(
-    number: Any, tree: Any, levels: Any, whole: Any, shoots: Any, sections: Any, before: Any, most: Any, out: Any
+    number: Any,
+    tree: Any,
+    levels: Any,
+    whole: Any,
+    shoots: Any,
+    sections: Any,
+    before: Any,
+    most: Any,
+    out: Any,
 ) -> None:
     """Fill the leaves of the last level's stems; `out` = (position, direction, normal, stem, node)."""
     t, parent, level = tree[0], levels[number], levels[number + 1]

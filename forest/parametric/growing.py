@@ -211,9 +211,7 @@ def _bear(
     out_of = (np.empty(n, np.int32), np.empty(n, np.int32))
     if n:
         below = (sum(len(s.key) for s, _ in grown[:-1]), sum(len(c.z) for _, c in grown[:-1]))
-        bear_leaves(
-            number, tree, levels, whole, shoots, sections, below, most, (*out, *out_of)
-        )
+        bear_leaves(number, tree, levels, whole, shoots, sections, below, most, (*out, *out_of))
     length = parameters.leaf_scale / np.sqrt(quality)
     leaves = Leaves(
         *out,

@@ -263,7 +263,7 @@ def _is_float(old: Any, new: Any) -> bool:
 
 
 _LEVEL_FIELDS = tuple(Level.model_fields)
-_TREE_FIELDS = tuple(PAPER_NAMES.values()) + ("clone_habit",)
+_TREE_FIELDS = (*PAPER_NAMES.values(), "clone_habit")
 LEVEL_ROW = np.dtype([(name, np.float64) for name in _LEVEL_FIELDS])
 TREE_ROW = np.dtype([(name, np.float64) for name in _TREE_FIELDS])
 

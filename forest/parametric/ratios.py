@@ -1,4 +1,4 @@
-"""The paper's curves: shape ratio, envelope, taper, flare, lobes (Weber & Penn 1995, 4.3, 4.4, 4.6)."""
+"""Shape ratio, envelope, taper, flare and lobes (Weber & Penn 1995, 4.3, 4.4, 4.6)."""
 
 from __future__ import annotations
 

@@ -223,7 +223,9 @@ def sections_of(level: Any, tree: Any, number: Any) -> Any:
 
 
 @njit
-def section_radius(level: Any, tree: Any, whole: Any, number: Any, radius: Any, z: Any, le: Any) -> Any:
+def section_radius(
+    level: Any, tree: Any, whole: Any, number: Any, radius: Any, z: Any, le: Any
+) -> Any:
     """Radius at z, m: tapered, and flared on the trunk."""
     r = tapered(radius, level.taper, z, le)
     return r * flared(tree.flare, z) * whole.trunk_factor if number == 0 else r

@@ -144,7 +144,7 @@ def write_vtp(
 
 
 def _blades(tree: ParametricTree, season: str, most: int = _MOST_LEAVES) -> tuple[Blades, float]:
-    """Take an even part of the leaves, at most `most`, and the factor that makes up for the rest."""
+    """Take an even part of the leaves, and the factor on their size that makes up for the rest."""
     total = len(tree.leaves.stem)
     chosen = np.arange(0, total, max(1, -(-total // most)))
     some = Leaves(*(column[chosen] for column in tree.leaves))

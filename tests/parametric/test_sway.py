@@ -1,0 +1,52 @@
+"""Trees in the wind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from forest.errors import InputError
+from forest.parametric import grow
+
+
+@pytest.mark.parametrize("name", ["quaking_aspen", "sassafras", "queen_palm"])
+def test_only_turns_change(name: str) -> None:
+    still = grow(name, 3)
+    moved = still.swayed(7.0, 5.0, 3.0, time_scale=2000.0)
+    assert np.abs(moved.nodes.position - still.nodes.position).max() > 0.1
+    a, b = still.skeleton(), moved.skeleton()
+    np.testing.assert_allclose(a.length, b.length, atol=1e-9)
+    np.testing.assert_array_equal(a.parent, b.parent)
+    np.testing.assert_array_equal(a.radius, b.radius)
+    # What a parent bears stays where it was on the parent.
+    born = np.flatnonzero((a.parent >= 0) & (a.axis != a.axis[a.parent]))
+    for end in ("start", "end"):
+        was, now = (
+            np.linalg.norm(t.start[born] - getattr(t, end)[t.parent[born]], axis=1) for t in (a, b)
+        )
+        np.testing.assert_allclose(was, now, atol=1e-9)
+    node = still.joints.leaf_node
+    for column in ("direction", "normal"):
+        was, now = (
+            (getattr(t.leaves, column) * t.nodes.heading[node]).sum(1) for t in (still, moved)
+        )
+        np.testing.assert_allclose(was, now, atol=1e-9)
+
+
+def test_no_wind_and_a_breath() -> None:
+    still = grow("quaking_aspen", 3)
+    assert still.swayed(11.0, 0.0) is still
+    breath = still.swayed(11.0, 1e-9)
+    np.testing.assert_allclose(breath.nodes.position, still.nodes.position, atol=1e-6)
+
+
+def test_moments_do_not_depend_on_each_other() -> None:
+    still = grow("lilac", 3)
+    first = still.swayed(2.0, 4.0).nodes.position
+    still.swayed(9.0, 4.0)
+    np.testing.assert_array_equal(still.swayed(2.0, 4.0).nodes.position, first)
+
+
+def test_refused_winds() -> None:
+    with pytest.raises(InputError, match="wind speed -1 is not allowed"):
+        grow("lilac", 3).swayed(0.0, -1.0)
