@@ -3,7 +3,8 @@
 `{scenario-keys}` and `{species-keys}` list every key with unit, default, range and meaning;
 `{species-values}` sets the shipped species side by side, `{species-sources}` says where the values
 come from. `{run-file-columns}` lists the tables of the run file, `{interop-columns}` what they give
-to other programs. `{parametric-keys}` lists the parameters of parametric trees. `{pictures}` shows the gallery.
+to other programs, `{parametric-keys}` the parameters of parametric trees. `{pictures}` shows the
+gallery.
 """
 
 from __future__ import annotations

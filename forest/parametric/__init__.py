@@ -1,4 +1,4 @@
-"""Trees that were not simulated: the model of Weber & Penn (1995) from parameters to a `Skeleton`."""
+"""Trees that were not simulated, made from parameters by the model of Weber & Penn (1995)."""
 
 from forest.parametric.growing import grow, grow_many
 from forest.parametric.parameters import (

@@ -1,4 +1,4 @@
-"""What stems bear: the origins of the next level's stems, and leaves (Weber & Penn 1995, 4.3, 4.5, 4.9).
+"""What stems bear: the next level's stems, and leaves (Weber & Penn 1995, 4.3, 4.5, 4.9).
 
 Children stand at even distances along the course of a family, from the bare base up; a clone
 bears those of its own part.
@@ -20,7 +20,7 @@ _DEGREE = np.pi / 180.0
 
 @njit
 def child_count(number: Any, most: Any, leaves: Any, shoots: Any, i: Any) -> Any:
-    """Children on the whole course of stem i of level `number`, to the nearest whole one (4.3, 4.5)."""
+    """Children on the whole course of stem i, to the nearest whole one (4.3, 4.5)."""
     if number == 0:
         share = 1.0
     elif leaves:
@@ -174,7 +174,7 @@ def bear_leaves(
     most: Any,
     out: Any,
 ) -> None:
-    """Fill the leaves of the last level's stems; `out` = (position, direction, normal, stem, node)."""
+    """Fill the leaves; `out` = (position, direction, normal, stem, node)."""
     t, parent, level = tree[0], levels[number], levels[number + 1]
     position, direction, normal, stem, at_node = out
     f, place = np.empty(9), np.empty(3)

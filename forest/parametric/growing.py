@@ -127,10 +127,19 @@ def _draw_scale(parameters: Parameters, seed: Any) -> float:
 
 
 def _origins(n: int) -> Origins:
-    three = [np.empty((n, 3)) for _ in range(3)]
-    lengths = [np.empty(n) for _ in range(6)]
     return Origins(
-        *three, *lengths, np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.uint64)
+        position=np.empty((n, 3)),
+        heading=np.empty((n, 3)),
+        side=np.empty((n, 3)),
+        length=np.empty(n),
+        longest=np.empty(n),
+        parent_length=np.empty(n),
+        parent_radius=np.empty(n),
+        limit=np.empty(n),
+        offset=np.empty(n),
+        parent=np.empty(n, np.int32),
+        node=np.empty(n, np.int32),
+        key=np.empty(n, np.uint64),
     )
 
 

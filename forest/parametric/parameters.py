@@ -15,8 +15,8 @@ from forest.species.schema import Refusal, Table, quantity, refusal
 from forest.species.text import parse_toml, read_text
 
 _FOLDER = Path(__file__).parent / "species"
-_ANGLE = {"unit": "degree", "ge": -720.0, "le": 720.0}
-_SPREAD = {"unit": "degree", "ge": 0.0, "le": 720.0}
+_ANGLE: dict[str, Any] = {"unit": "degree", "ge": -720.0, "le": 720.0}
+_SPREAD: dict[str, Any] = {"unit": "degree", "ge": 0.0, "le": 720.0}
 
 
 class Level(Table):
@@ -221,7 +221,8 @@ def from_paper(values: Mapping[str, Any]) -> Parameters:
     for name, value in values.items():
         section, key = locate(name)
         (table if section < 0 else levels[section])[key] = value
-    for row, model in [(table, Parameters), *((level, Level) for level in levels)]:
+    rows: list[tuple[dict[str, Any], type[Table]]] = [(table, Parameters)]
+    for row, model in rows + [(level, Level) for level in levels]:
         for key, value in row.items():
             if model.model_fields[key].annotation is float and isinstance(value, int):
                 row[key] = float(value)

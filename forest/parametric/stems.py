@@ -263,7 +263,7 @@ def grow_family(
     fits = True
     f, p = np.empty(12), np.empty(6)
     pending.at[0, 0] = 0
-    waiting = 1
+    waiting: Any = 1
     while waiting > 0:
         waiting -= 1
         start = np.int64(pending.at[waiting, 0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +148,8 @@ def _blades(tree: ParametricTree, season: str, most: int = _MOST_LEAVES) -> tupl
     """Take an even part of the leaves, and the factor on their size that makes up for the rest."""
     total = len(tree.leaves.stem)
     chosen = np.arange(0, total, max(1, -(-total // most)))
-    some = Leaves(*(column[chosen] for column in tree.leaves))
+    columns: list[Any] = [column[chosen] for column in tree.leaves]
+    some = Leaves(*columns)
     grain = 0.85 + 0.3 * np.modf(np.arange(len(chosen)) * 0.6180339887498949)[0]
     blades = Blades(
         place=some.position,
