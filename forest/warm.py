@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 
+from forest.parametric import grow
 from forest.scenario import Scenario
 from forest.stand import Stand
 
@@ -44,7 +45,7 @@ _VARIANTS = {
 
 
 def main() -> None:
-    """Grow the tiny stands and say how long each took."""
+    """Grow the tiny stands and a shrub, and say how long each took."""
     stand = Scenario.from_toml(_STAND, where="forest.warm")
     for name, changes in _VARIANTS.items():
         start = time.perf_counter()
@@ -53,6 +54,10 @@ def main() -> None:
         for _ in range(_YEARS):
             grown.step()
         print(f"{time.perf_counter() - start:.1f} s", flush=True)
+    start = time.perf_counter()
+    print("kernels: parametric trees ... ", end="", flush=True)
+    grow("lilac").swayed(1.0, 1.0)
+    print(f"{time.perf_counter() - start:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

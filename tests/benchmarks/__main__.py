@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.benchmarks import bending, costs, machine, report, runs, stands
+from tests.benchmarks import bending, costs, machine, parametric, report, runs, stands
 
 
 class Extent(NamedTuple):
@@ -62,6 +62,9 @@ def measure(extent: Extent) -> dict[str, Any]:
         "the paper's tree", machine.alone, runs.grow_paper_tree, extent.repeats
     )
     result["run"] = _say("a run", machine.alone, runs.run_hectare, extent.run)
+    result["parametric"] = _say(
+        "parametric trees", machine.alone, parametric.measure_parametric, extent.repeats
+    )
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")

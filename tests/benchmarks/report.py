@@ -134,6 +134,9 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
         (f"{tree['seconds']:.2f}", f"{tree['cpu_seconds']:.2f}"),
     )
     yield Line("peak of the process, GB", (f"{tree['peak_gb']:.2f}",))
+    forms = result["parametric"]
+    yield Line("a parametric aspen, ms", (f"{1e3 * forms['aspen_s']:.1f}",))
+    yield Line("a leaf of a parametric willow, us", (f"{1e6 * forms['willow_leaf_s']:.2f}",))
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")

@@ -1,0 +1,69 @@
+"""`forest tree`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from forest.cli import main
+from forest.interop import read_simpleforest
+from forest.parametric import grow
+from forest.parametric.parameters import parametric_names
+
+
+def _forest(*words: str) -> int:
+    with pytest.raises(SystemExit) as end:
+        main(["tree", *words])
+    return int(end.value.code or 0)
+
+
+def test_cylinders_are_those_of_the_tree(tmp_path: Path) -> None:
+    to = tmp_path / "aspen.csv"
+    assert _forest("quaking_aspen", "--seed", "3", "--to", str(to)) == 0
+    read, made = read_simpleforest(to), grow("quaking_aspen", 3).skeleton()
+    np.testing.assert_array_equal(read.parent, made.parent)
+    np.testing.assert_allclose(read.end, made.end, atol=1e-6)
+    assert read.order.max() == 2
+
+
+def test_tubes_and_leaves(tmp_path: Path) -> None:
+    import pyvista
+
+    palm = grow("queen_palm", 1)
+    for option, leaves in (("--leaves", len(palm.leaves.stem)), ("--no-leaves", 0)):
+        to = tmp_path / f"palm{option}.vtp"
+        assert _forest("queen_palm", "--seed", "1", option, "--to", str(to)) == 0
+        mesh = pyvista.read(to)
+        assert int(mesh.cell_data["leaf"].sum()) == leaves
+        assert mesh.bounds[5] == pytest.approx(palm.nodes.position[:, 2].max(), abs=1.5)
+
+
+def test_picture(tmp_path: Path) -> None:
+    to = tmp_path / "lilac.png"
+    words = ("lilac", "--set", "1Branches=3", "--season", "fall", "--wind", "3", "--time", "9")
+    assert _forest(*words, "--to", str(to)) == 0
+    assert to.stat().st_size > 5_000
+
+
+def test_species_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert _forest("--list") == 0
+    listed = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert listed == parametric_names()
+    assert len(listed) >= 10
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["quaking_aspn"], "did you mean 'quaking_aspen'?"),
+        (["lilac", "--season", "sumer"], "did you mean 'summer'?"),
+        (["lilac", "--readings", "mine"], "unknown readings 'mine'"),
+        (["lilac", "--to", "lilac.obj"], "unknown format '.obj'"),
+        (["lilac", "--seed", "-1"], "seed -1 is not allowed"),
+    ],
+)
+def test_refused(words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _forest(*words) == 2
+    assert message in capsys.readouterr().err
