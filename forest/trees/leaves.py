@@ -11,14 +11,36 @@ from forest.errors import InputError
 from forest.species import Species
 from forest.trees.skeleton import Skeleton
 
-#: Codes of `Leaves.shape`: a flat oval blade, and a spray of needles along a shoot.
-OVAL, SPRAY = 0, 1
+#: The outlines that a code of `Leaves.shape` stands for. A spray is a shoot's flat row of needles.
+LEAF_SHAPES = (
+    "oval",
+    "triangle",
+    "oak_3_lobes",
+    "maple_3_lobes",
+    "maple_5_lobes",
+    "three_leaflets",
+    "spray",
+)
+OVAL, SPRAY = LEAF_SHAPES.index("oval"), LEAF_SHAPES.index("spray")
 
-#: Outline of each shape, by its code: corners (n, 2) once around, as shares of the length from the
-#: petiole and of the width from the midrib.
+
+def _blade(*edge: tuple[float, float]) -> NDArray[np.float64]:
+    """Make an outline of one edge: petiole, edge, tip, the edge's mirror image."""
+    right = np.array(edge)
+    left = right[::-1] * np.array([1.0, -1.0])
+    return np.concatenate(([[0.0, 0.0]], right, [[1.0, 0.0]], left))
+
+
+#: Corners (n, 2) of each outline from the petiole around: shares of the length along the midrib and
+#: of the width across it. The petiole sees every corner, so that a fan of triangles fills it.
 OUTLINES: tuple[NDArray[np.float64], ...] = (
-    np.array([[0.0, 0.0], [0.3, -0.45], [0.7, -0.4], [1.0, 0.0], [0.7, 0.4], [0.3, 0.45]]),
-    np.array([[0.0, 0.0], [0.5, -0.5], [1.0, 0.0], [0.5, 0.5]]),
+    _blade((0.3, -0.5), (0.7, -0.4)),
+    _blade((0.0, -0.5)),
+    _blade((0.35, -0.5), (0.55, -0.22), (0.85, -0.28)),
+    _blade((0.15, -0.25), (0.6, -0.5), (0.5, -0.15)),
+    _blade((0.15, -0.4), (0.25, -0.25), (0.65, -0.5), (0.55, -0.15)),
+    _blade((0.1, -0.3), (0.5, -0.5), (0.35, -0.15), (0.15, -0.05), (0.6, -0.18)),
+    _blade((0.5, -0.5)),
 )
 
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
@@ -40,7 +62,7 @@ class Leaves(NamedTuple):
     length, width : float64 (m,)
         Size of the blade, m.
     shape : int8 (m,)
-        Code of its outline (see `OUTLINES`).
+        Its outline, an index into `LEAF_SHAPES` and `OUTLINES`.
     stem : int32 (m,)
         Number of the stem that bears it; for a `Skeleton`, of its axis.
     """

@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 
 from forest.errors import InputError
 from forest.species import load_species
-from forest.trees.leaves import OUTLINES, OVAL, SPRAY, leaves_of, no_leaves, outline_area
+from forest.trees.leaves import (
+    LEAF_SHAPES,
+    OUTLINES,
+    OVAL,
+    SPRAY,
+    leaves_of,
+    no_leaves,
+    outline_area,
+)
 from tests.surface.bushes import bush
 
 SPECIES = {name: load_species(name) for name in ("fagus_sylvatica", "picea_abies")}
@@ -50,12 +58,15 @@ def test_needles_lie_along_the_shoot_and_blades_stand_at_its_end() -> None:
         np.testing.assert_allclose(cosine, np.cos(np.radians(angle)))
 
 
-def test_outlines_lie_in_their_box() -> None:
-    for outline in OUTLINES:
-        assert outline[:, 0].min() == 0.0
-        assert outline[:, 0].max() == 1.0
-        assert np.abs(outline[:, 1]).max() <= 0.5
-    assert outline_area(OUTLINES[SPRAY]) == 0.5
+@pytest.mark.parametrize("name", LEAF_SHAPES)
+def test_outlines_fill_their_box_and_are_filled_by_fans(name: str) -> None:
+    outline = OUTLINES[LEAF_SHAPES.index(name)]
+    assert (outline[:, 0].min(), outline[:, 0].max()) == (0.0, 1.0)
+    assert (outline[:, 1].min(), outline[:, 1].max()) == (-0.5, 0.5)
+    first, second = outline[1:-1], outline[2:]
+    fan = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    assert (fan > 0.0).all()
+    assert outline_area(outline) == pytest.approx(fan.sum())
 
 
 def test_a_bare_tree_has_none() -> None:
