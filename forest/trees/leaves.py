@@ -96,6 +96,19 @@ def no_leaves() -> Leaves:
     )
 
 
+def living_sites(skeleton: Skeleton) -> NDArray[np.int64]:
+    """Count the leaf-bearing sites of each internode: 0, 1 or 2.
+
+    A skeleton says only whether there is one. A leafy internode that bears nothing has both, its
+    terminal and its lateral bud; one that goes on or has branched has the other. A tip may have
+    lost one of the two, or a branch: lone trees of 20 years have 0 to 0.7 % fewer sites than
+    this, those of the generic species 7 %.
+    """
+    bears = np.zeros(len(skeleton), np.bool_)
+    bears[skeleton.parent[skeleton.parent >= 0]] = True
+    return np.where(skeleton.leafy, np.where(bears, 1, 2), 0).astype(np.int64)
+
+
 def leaves_of(skeleton: Skeleton, species: Species, *, per_site: int = 1) -> Leaves:
     """Give the leaves of a simulated tree: some on each leafy internode.
 
@@ -116,8 +129,8 @@ def leaves_of(skeleton: Skeleton, species: Species, *, per_site: int = 1) -> Lea
     Returns
     -------
     Leaves
-        `per_site` leaves of each leafy internode, in the skeleton's order; the sum of their areas
-        is `leaves.area_m2` for each leafy internode.
+        `per_site` leaves of each site (see `living_sites`), in the skeleton's order; the areas of
+        a site's leaves add up to `leaves.area_m2`.
 
     Raises
     ------
@@ -126,7 +139,9 @@ def leaves_of(skeleton: Skeleton, species: Species, *, per_site: int = 1) -> Lea
     """
     if per_site < 1:
         raise InputError(f"per_site is {per_site}", expected="1 or more")
-    sites = np.repeat(np.flatnonzero(skeleton.leafy), per_site)
+    count = per_site * living_sites(skeleton)
+    sites = np.repeat(np.arange(len(skeleton)), count)
+    which = np.arange(len(sites)) - np.repeat(np.cumsum(count) - count, count)
     needles = species.group == "conifer"
     shape = SPRAY if needles else OVAL
     lengthwise = skeleton.end[sites] - skeleton.start[sites]
@@ -134,7 +149,7 @@ def leaves_of(skeleton: Skeleton, species: Species, *, per_site: int = 1) -> Lea
     heading = np.where(
         shoot_length[:, None] > 1e-9, lengthwise / np.maximum(shoot_length, 1e-9)[:, None], _UP
     )
-    turn = (skeleton.serial[sites] * per_site + np.arange(len(sites)) % per_site) * _GOLDEN_ANGLE
+    turn = (2.0 * per_site * skeleton.serial[sites] + which) * _GOLDEN_ANGLE
     direction = _turned_off(heading, _SPRAY_ANGLE if needles else _BLADE_ANGLE, turn)
     product = species.leaves.area_m2 / (per_site * outline_area(OUTLINES[shape]))
     if needles:

@@ -11,7 +11,7 @@ from forest.species import load_species
 from forest.surface import Drawing, describe, fractions
 from forest.surface.description import LEAF_ITEM, SIDES
 from forest.surface.frames import carry_frames
-from forest.trees.leaves import OUTLINES, leaves_of, no_leaves
+from forest.trees.leaves import OUTLINES, leaves_of, living_sites, no_leaves
 from forest.trees.skeleton import Skeleton
 from tests.reference import detail as slow
 from tests.surface.bushes import bush
@@ -62,11 +62,11 @@ def test_what_is_drawn_is_what_the_loop_says(seed: int, n: int, range_m: float) 
         assert list(drawing.lines.element[here]) == threads
         np.testing.assert_array_equal(drawing.lines.vertices[here, 1], tree.end[threads])
     polygons, points = slow.leaf_shares(range_m, "summer", False)
-    blades = slow.loop(2 * int(tree.leafy.sum()), polygons * 4, 4)
+    blades = slow.loop(2 * int(living_sites(tree).sum()), polygons * 4, 4)
     here = drawing.triangles.item == LEAF_ITEM
     fan = len(OUTLINES[0]) - 2
     assert list(drawing.triangles.element[here]) == [i for i in blades for _ in range(fan)]
-    dots = slow.loop(2 * int(tree.leafy.sum()), points * 8, 8)
+    dots = slow.loop(2 * int(living_sites(tree).sum()), points * 8, 8)
     assert list(drawing.points.element) == dots
     for part in drawing:
         assert np.isfinite(part.vertices).all()
@@ -78,7 +78,9 @@ def test_near_by_every_leaf_has_its_area(seed: int, n: int) -> None:
     tree = bush(seed, n)
     drawing = look(tree, 5.0)
     blades = drawing.triangles.vertices[drawing.triangles.item == LEAF_ITEM]
-    np.testing.assert_allclose(area(blades), tree.leafy.sum() * BEECH.leaves.area_m2, rtol=1e-9)
+    np.testing.assert_allclose(
+        area(blades), living_sites(tree).sum() * BEECH.leaves.area_m2, rtol=1e-9
+    )
 
 
 def straight(n: int, radius: float) -> Skeleton:

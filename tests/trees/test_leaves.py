@@ -9,16 +9,19 @@ from hypothesis import strategies as st
 
 from forest.errors import InputError
 from forest.species import load_species
+from forest.stand import Stand
 from forest.trees.leaves import (
     LEAF_SHAPES,
     OUTLINES,
     OVAL,
     SPRAY,
     leaves_of,
+    living_sites,
     no_leaves,
     outline_area,
 )
 from tests.surface.bushes import bush
+from tests.tiny import tiny
 
 SPECIES = {name: load_species(name) for name in ("fagus_sylvatica", "picea_abies")}
 
@@ -31,11 +34,11 @@ SPECIES = {name: load_species(name) for name in ("fagus_sylvatica", "picea_abies
 def test_each_site_has_its_area_of_leaves(seed: int, n: int, name: str, per_site: int) -> None:
     tree, species = bush(seed, n), SPECIES[name]
     leaves = leaves_of(tree, species, per_site=per_site)
-    sites = np.flatnonzero(tree.leafy)
+    sites = [i for i in range(n) if tree.leafy[i] for _ in range(1 if i in tree.parent else 2)]
     assert len(leaves.area) == per_site * len(sites)
     by_site = leaves.area.reshape(-1, per_site).sum(axis=1)
     np.testing.assert_allclose(by_site, species.leaves.area_m2)
-    assert list(leaves.stem) == list(np.repeat(tree.axis[sites], per_site))
+    assert list(leaves.stem) == list(tree.axis[sites].repeat(per_site))
     for vector in (leaves.direction, leaves.normal):
         np.testing.assert_allclose(np.linalg.norm(vector, axis=1), 1.0)
     np.testing.assert_allclose(np.sum(leaves.direction * leaves.normal, axis=1), 0.0, atol=1e-9)
@@ -43,10 +46,23 @@ def test_each_site_has_its_area_of_leaves(seed: int, n: int, name: str, per_site
     assert (leaves.width <= leaves.length * (1 + 1e-9)).all()
 
 
+def test_grown_trees_have_the_leaf_area_that_they_are_measured_with() -> None:
+    """A skeleton does not hold the number of sites; they are told from what a site bears."""
+    stand = Stand(tiny())
+    for _ in range(8):
+        stand.step()
+    assert len(stand.trees) > 5
+    for tree_id, measured in zip(stand.trees.tree_id, stand.trees.leaf_area_m2, strict=True):
+        tree = stand.skeleton(int(tree_id))
+        area = leaves_of(tree, load_species(tree.species)).area.sum()
+        assert area == pytest.approx(measured, rel=0.05)
+
+
 def test_needles_lie_along_the_shoot_and_blades_stand_at_its_end() -> None:
     tree = bush(3, 40)
-    sites = np.flatnonzero(tree.leafy & (tree.length > 0.0))
-    at = np.searchsorted(np.flatnonzero(tree.leafy), sites)
+    sites = np.repeat(np.arange(len(tree)), living_sites(tree))
+    at = np.flatnonzero(tree.length[sites] > 0.0)
+    sites = sites[at]
     heading = (tree.end - tree.start)[sites] / tree.length[sites, None]
     for name, shape, place, angle in (
         ("picea_abies", SPRAY, tree.start, 15.0), ("fagus_sylvatica", OVAL, tree.end, 55.0)
