@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from forest.parametric import ParametricTree
 from forest.record.export import whole_file
-from forest.trees.leaves import Leaves
+from forest.trees.leaves import OUTLINES, Leaves
 from forest.view import shapes
 from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, save
 from forest.view.shading import LightVolume
@@ -134,9 +134,9 @@ def write_vtp(
     tubes.clear_data()
     tubes.cell_data["leaf"] = np.zeros(tubes.n_cells, np.uint8)
     if leaves and len(tree.leaves.stem):
-        corners = _blades(tree, "summer", most=len(tree.leaves.stem))[0].cards(1.0)
-        n = len(corners)
-        faces = np.column_stack((np.full(n, 4), np.arange(4 * n).reshape(n, 4))).ravel()
+        corners = _outlines(tree.leaves, tree.parameters.leaf_shape)
+        n, k = corners.shape[:2]
+        faces = np.column_stack((np.full(n, k), np.arange(k * n).reshape(n, k))).ravel()
         cards = pv.PolyData(corners.reshape(-1, 3), faces)
         cards.cell_data["leaf"] = np.ones(n, np.uint8)
         tubes = tubes.append_polydata(cards)
@@ -144,10 +144,19 @@ def write_vtp(
         tubes.save(draft)
 
 
-def _blades(tree: ParametricTree, season: str, most: int = _MOST_LEAVES) -> tuple[Blades, float]:
+def _outlines(leaves: Leaves, shape: int) -> NDArray[np.float64]:
+    """Give the corners (n, k, 3) of all leaves' outlines."""
+    along = leaves.direction * leaves.length[:, None]
+    across = np.cross(leaves.normal, leaves.direction) * leaves.width[:, None]
+    x, y = OUTLINES[shape].T
+    bent = along[:, None] * x[None, :, None] + across[:, None] * y[None, :, None]
+    return np.asarray(leaves.position[:, None] + bent, np.float64)
+
+
+def _blades(tree: ParametricTree, season: str) -> tuple[Blades, float]:
     """Take an even part of the leaves, and the factor on their size that makes up for the rest."""
     total = len(tree.leaves.stem)
-    chosen = np.arange(0, total, max(1, -(-total // most)))
+    chosen = np.arange(0, total, max(1, -(-total // _MOST_LEAVES)))
     columns: list[Any] = [column[chosen] for column in tree.leaves]
     some = Leaves(*columns)
     grain = 0.85 + 0.3 * np.modf(np.arange(len(chosen)) * 0.6180339887498949)[0]
