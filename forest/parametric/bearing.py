@@ -95,7 +95,9 @@ def stand_at(
     k = min(max(np.int64(along), np.int64(0)), np.int64(shoots.nodes[i]) - 2)
     node = np.int64(shoots.first[i]) + k
     load_frame(f, sections.side, sections.heading, node)
-    place[:] = sections.position[node] + (along - k) * shoots.length[i] / total * f[6:9]
+    far = (along - k) * shoots.length[i] / total
+    for c in range(3):
+        place[c] = sections.position[node, c] + far * f[6 + c]
     return node
 
 
@@ -198,6 +200,9 @@ def bear_leaves(
             turn_x(f, down_angle(level, (1.0 - z) / (1.0 - bare), b))
             if t.leaf_bend > 0.0:
                 orient(f, place, t.leaf_bend)
-            position[row], direction[row], normal[row] = place, f[6:9], f[3:6]
+            for k in range(3):  # an assignment of slices would allocate
+                position[row, k] = place[k]
+                direction[row, k] = f[6 + k]
+                normal[row, k] = f[3 + k]
             stem[row], at_node[row] = before[0] + i, before[1] + node
             row += 1

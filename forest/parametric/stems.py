@@ -320,10 +320,13 @@ def grow_family(
                 if s > start and k == 1:
                     sections.heading[m - 1], sections.side[m - 1] = f[6:9], f[0:3]
                 if k > 0:
-                    p[:3] += step * f[6:9]
+                    for c in range(3):
+                        p[c] += step * f[6 + c]
                     fits &= inside(tree, whole, p[0], p[1], p[2])
-                sections.position[m] = p[:3]
-                sections.heading[m], sections.side[m] = f[6:9], f[0:3]
+                for c in range(3):  # an assignment of slices would allocate
+                    sections.position[m, c] = p[c]
+                    sections.heading[m, c] = f[6 + c]
+                    sections.side[m, c] = f[c]
                 z = (s * per + k) / (res * per)
                 sections.z[m] = z
                 sections.radius[m] = section_radius(level, tree, whole, number, radius, z, length)
