@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -374,24 +374,12 @@ class Output(Table):
     """What the run file holds."""
 
     tables: tuple[_TableName, ...] = quantity(
-        (
-            "trees",
-            "stand",
-            "events",
-            "rings",
-            "carbon",
-            "stability",
-            "climate",
-            "deadwood",
-            "regeneration",
-            "treatments",
-            "storms",
-        ),
+        get_args(_TableName),
         "tables to write; stability only has rows where there is a table mechanics, deadwood "
         "where there are snags, regeneration where there is a table of that name, treatments "
         "where there are acts, storms where the wind blew",
         unit="",
-        max_length=11,
+        max_length=len(get_args(_TableName)),
     )
     sample_trees: SampleTrees = SampleTrees()
     ring_heights_m: tuple[_DiscHeight, ...] = quantity(
