@@ -27,7 +27,7 @@ _FALL = 1.8  # beyond it a share (_FULL_M / distance) ** _FALL,
 _REACH_M = 60.0  # and none beyond this
 _FADES = 0.7  # the blades get lower in the outer part of the reach
 _TILT = 0.12  # least lean of a blade at its foot, m per m
-_SHADED = 0.45  # light in the shade of a tree
+_SHADED = 0.52  # light in the shade of a tree
 _REPEAT = 1024  # cells after which the grass repeats itself, far beyond the reach
 _MOST_PER_M2 = 4096
 
@@ -68,9 +68,9 @@ class Grass:
 
 #: The three kinds that a feature map's codes 1, 2 and 3 mean unless the scene says otherwise.
 GRASSES: Mapping[str, Grass] = {
-    "lawn": Grass(0.07, 900.0, 0.25, (0.11, 0.19, 0.05), (0.33, 0.50, 0.16)),
-    "meadow": Grass(0.35, 420.0, 0.45, (0.10, 0.16, 0.05), (0.42, 0.54, 0.20)),
-    "tall": Grass(0.75, 220.0, 0.60, (0.13, 0.15, 0.06), (0.60, 0.57, 0.30)),
+    "lawn": Grass(0.07, 900.0, 0.25, (0.15, 0.24, 0.07), (0.40, 0.57, 0.20)),
+    "meadow": Grass(0.35, 420.0, 0.45, (0.16, 0.23, 0.07), (0.50, 0.62, 0.25)),
+    "tall": Grass(0.75, 220.0, 0.60, (0.18, 0.20, 0.08), (0.66, 0.64, 0.34)),
 }
 
 

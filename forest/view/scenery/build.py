@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError
-from forest.parametric import Parameters, ParametricTree, grow, grow_many, load_parameters
+from forest.parametric import Parameters, ParametricTree, grow, load_parameters
 from forest.species.text import input_error
 from forest.surface.feature_map import FeatureMap, Spreading, read_feature_map, spread
 from forest.surface.grass import GRASSES, Grass
@@ -205,7 +205,8 @@ def _stand(
         with _told(where, f"tree[{number}].species"):
             parameters = _parameters(tree.species, folder)
         one = stock.number(
-            (parameters.name, tree.species, tree.seed), _growth(parameters, tree.seed)
+            (tree.species, tree.seed, tree.leaf_number),
+            _growth(parameters, tree.seed, tree.leaf_number),
         )
         factor = 1.0 if tree.height_m is None else tree.height_m / stock.heights[one]
         model.append(np.array([one]))
@@ -226,19 +227,18 @@ def _variants(row: Trees, folder: Path, where: str, stock: Stock) -> list[int]:
             return [stock.number((row.run, row.sample, row.year), lambda: _sample(row, folder))]
     with _told(where, "species"):
         parameters = _parameters(row.species, folder)
-    seeds = range(row.seed, row.seed + row.variants)
-    grown = dict(zip(seeds, grow_many(parameters, seeds), strict=True))
     return [
         stock.number(
-            (parameters.name, row.species, seed),
-            lambda seed=seed: parametric_model(grown[seed]),  # type: ignore[misc]
+            (row.species, seed, row.leaf_number), _growth(parameters, seed, row.leaf_number)
         )
-        for seed in seeds
+        for seed in range(row.seed, row.seed + row.variants)
     ]
 
 
-def _growth(parameters: Parameters, seed: int) -> Callable[[], tuple[Model, float]]:
-    return lambda: parametric_model(grow(parameters, seed))
+def _growth(
+    parameters: Parameters, seed: int, leaf_number: float
+) -> Callable[[], tuple[Model, float]]:
+    return lambda: parametric_model(grow(parameters, seed, quality=leaf_number))
 
 
 def _parameters(species: str, folder: Path) -> Parameters:
