@@ -23,6 +23,7 @@ from forest._threads import in_threads
 from forest.errors import InputError, nearest
 from forest.surface.description import LEAF_ITEM
 from forest.surface.detail import SEASONS
+from forest.surface.directions import unit
 from forest.surface.instances import Elements, Instances, Model
 
 _OWN_CELLS = 512  # along the longer side of a model's own map
@@ -57,6 +58,12 @@ class ShadowMap(NamedTuple):
     cell_m: float
     depth: NDArray[np.float32]
     owner: NDArray[np.int32]
+
+
+#: A map in which nothing stands.
+NO_MAP = ShadowMap(
+    np.zeros((3, 3)), np.zeros(2), 1.0, np.empty((0, 0), np.float32), np.empty((0, 0), np.int32)
+)
 
 
 class ModelShadow(NamedTuple):
@@ -187,15 +194,6 @@ def _checked(sun: ArrayLike, season: str) -> NDArray[np.float64]:
     return direction
 
 
-def unit(vector: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Scale a vector (3,) to length 1, or say that it has no direction."""
-    found = np.asarray(vector, np.float64)
-    length = np.sqrt(np.sum(found**2)) if found.shape == (3,) else 0.0
-    if not 0.0 < length < np.inf:
-        raise InputError(f"{name} is {vector}", expected="three numbers, not all 0")
-    return np.asarray(found / length, np.float64)
-
-
 def _leafy(model: Model, season: str) -> bool:
     return model.evergreen or season != "winter"
 
@@ -226,8 +224,8 @@ def _own_shadow(model: Model, axes: NDArray[np.float64], *, leafy: bool) -> Mode
         lower = upper = np.zeros(2)
     cell = max(float((upper - lower).max()) / _OWN_CELLS, _LEAST_CELL_M)
     picture = _empty_map(axes, lower, upper, cell)
-    for part in corners:
-        _rasterise(part, picture.corner, picture.cell_m, picture.depth)
+    for triangles in corners:
+        _rasterise(triangles, picture.corner, picture.cell_m, picture.depth)
     shaded: list[NDArray[np.bool_]] = []
     for part in lists:
         if part.corners < 3:  # lines of the stems, then points of the leaves: one of each element
