@@ -63,7 +63,7 @@ class Elements(NamedTuple):
     @property
     def corners(self) -> int:
         """Three of triangles, two of lines, one of points."""
-        return self.vertices.shape[1] // 3
+        return int(self.vertices.shape[1]) // 3
 
     def share(self, shares: Fractions) -> NDArray[np.float64]:
         """Give what is drawn of this list, from what is drawn of all."""
@@ -107,9 +107,7 @@ class Model:
         colours = {"bark": self.bark, **{f"foliage in {k}": v for k, v in self.foliage.items()}}
         for name, colour in colours.items():
             if len(colour) != 3 or not all(0.0 <= part <= 1.0 for part in colour):
-                raise InputError(
-                    f"{name} is {colour}", expected="red, green and blue from 0 to 1"
-                )
+                raise InputError(f"{name} is {colour}", expected="red, green and blue from 0 to 1")
 
     @classmethod
     def of(
