@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from forest.dynamics.draws import uniforms_of
 from forest.errors import InputError
 from forest.random import STREAM_GRASS
-from forest.surface.frame import Camera
+from forest.surface.camera import Camera
 from forest.surface.terrain import HeightField
 
 #: Straight pieces of a blade.

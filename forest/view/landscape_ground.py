@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.surface.frame import Camera
+from forest.surface.camera import Camera
 from forest.surface.shadow import SceneShadow
 from forest.view.scenery.scenery import RGB, Scenery
 
@@ -24,7 +24,7 @@ _GROWTH = 0.022  # by which each step is longer than the one before it
 _FAR_M = 4000.0
 _SKY_M = 5000.0
 _ZENITH = np.array([0.30, 0.50, 0.78])
-_AMBIENT, _SUN = 0.46, 0.62  # shares of the light on level ground, from the sky and the sun
+_AMBIENT, _SUN = 0.56, 0.58  # shares of the light on level ground, from the sky and the sun
 _CLEAR_M = 9000.0  # even clear air fades the far ground
 _BLADES_HIDE = 0.75  # of the ground under grass
 

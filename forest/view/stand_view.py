@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.record.export import whole_file
-from forest.surface.frame import Camera, Frame, prepare
+from forest.surface.camera import Camera
+from forest.surface.frame import Frame, prepare
 from forest.surface.grass import grow_grass
 from forest.surface.shadow import SceneShadow, scene_shadow
 from forest.view.landscape_ground import GRASS_TINT, ground, hazed, sky
@@ -23,7 +24,7 @@ _MOST_SHADOW_CELLS = 4_000_000
 _WIDEST_PX = 12  # lines and points are drawn up to this many fine pixels wide
 _NEAR_M, _FAR_M = 0.15, 12_000.0
 _BLADE_WIDTH_M = 0.006
-_GRAIN = 0.2
+_GRAIN, _FACE_GRAIN = 0.2, 0.07  # of lines and points, and of faces, which the sun tells apart
 
 _Say = Callable[[str], object]
 
@@ -224,7 +225,7 @@ def _add_trees(plotter: Any, frame: Frame) -> None:
     if n:
         faces = np.arange(3 * n).reshape(n, 3)
         mesh = pv.PolyData.from_regular_faces(frame.triangles.reshape(-1, 3), faces)
-        mesh.cell_data["rgb"] = _grained(frame.triangle_colour, frame.triangles)
+        mesh.cell_data["rgb"] = _grained(frame.triangle_colour, frame.triangles, _FACE_GRAIN)
         plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
     for size, here in _by_size(OVERSAMPLING * frame.line_width):
         mesh = pv.PolyData()
@@ -240,14 +241,16 @@ def _add_trees(plotter: Any, frame: Frame) -> None:
         plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False, point_size=size)
 
 
-def _grained(colour: NDArray[np.uint8], vertices: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Make colours (n, 3) a little brighter or darker, by where the first of (n, k, 3) stands.
+def _grained(
+    colour: NDArray[np.uint8], vertices: NDArray[np.float32], grain: float = _GRAIN
+) -> NDArray[np.uint8]:
+    """Make colours (n, 3) a little brighter or darker, by where their first corner stands.
 
     Leaves differ, and those of a crown's shady side would else be one even patch.
     """
-    x, y, z = vertices[:, 0].T
+    x, y, z = vertices.reshape(len(vertices), -1)[:, :3].T
     chance = np.modf(np.abs(np.sin(x * 12.9898 + y * 78.233 + z * 37.719)) * 4375.85)[0]
-    grained = colour * (1.0 + _GRAIN * (2.0 * chance[:, None] - 1.0))
+    grained = colour * (1.0 + grain * (2.0 * chance[:, None] - 1.0))
     return np.clip(grained, 0.0, 255.0).astype(np.uint8)
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from forest.errors import InputError
-from forest.surface.frame import Camera
+from forest.surface.camera import Camera
 from forest.surface.grass import GRASSES, SEGMENTS, Blades, Grass, grow_grass
 from forest.surface.terrain import HeightField
 
@@ -84,7 +84,7 @@ def test_kinds_shade_and_view() -> None:
     dark = grown(GRASSES["meadow"], camera, flat, light_at=lambda p: np.ones(len(p)))
     assert dark.colour.mean() < 0.7 * lit.colour.mean()
     assert len(grow_grass({2: GRASSES["lawn"]}, everywhere, flat, camera).colour) == 0
-    up = look((0.0, 0.0, 1.7), (0.0, 1.0, 9.0))
+    up = look((0.0, 0.0, 20.0), (0.0, 1.0, 40.0))
     assert len(grown(GRASSES["meadow"], up, flat).colour) == 0
     high = look((0.0, 0.0, 500.0), (0.0, 0.1, 0.0))
     assert len(grown(GRASSES["meadow"], high, flat).colour) == 0

@@ -35,8 +35,8 @@ _STAND_IN_SEEDS = 3
 #: Shapes of a species that are kept at most; other trees take the one that is nearest in height.
 MOST_SHAPES = 60
 
-_LITTER = (0.34, 0.27, 0.17)
-_LEAVES_PER_SITE = {"conifer": 1, "broadleaf": 2}
+_LITTER = (0.42, 0.33, 0.21)
+_LEAVES_PER_SITE = 3  # that share its area; a single one would be as large as a hand
 
 
 class _Shape(NamedTuple):
@@ -52,10 +52,9 @@ def simulated_model(skeleton: Skeleton, species: Mapping[str, Species]) -> tuple
     kind = species[skeleton.species]
     evergreen = kind.group == "conifer"
     bark, foliage = colours_of(skeleton.species, evergreen=evergreen)
-    per_site = 1 if evergreen else _LEAVES_PER_SITE["broadleaf"]
     model = Model.of(
         skeleton,
-        leaves_of(skeleton, kind, per_site=per_site),
+        leaves_of(skeleton, kind, per_site=_LEAVES_PER_SITE),
         evergreen=evergreen,
         bark=bark,
         foliage=foliage,
