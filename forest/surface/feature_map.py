@@ -107,7 +107,12 @@ def read_feature_map(
             f"unknown format '{path.suffix}'", where=path.name, expected=", ".join(MAP_SUFFIXES)
         )
     values = read_array(path) if suffix == ".npy" else read_grey(path)
-    if values.dtype.kind not in "iu" or values.size == 0 or values.min() < 0 or values.max() > 65535:
+    if (
+        values.dtype.kind not in "iu"
+        or values.size == 0
+        or values.min() < 0
+        or values.max() > 65535
+    ):
         raise input_error("holds no bits", where=path.name, expected="whole numbers, 0 to 65535")
     try:
         return FeatureMap(values.astype(np.uint16), cell_m, origin)
@@ -200,7 +205,7 @@ def _spread_one(features: FeatureMap, kind: Spreading, number: int, seed: int) -
     count = round(kind.per_ha * area / 1e4)
     if count > MOST_TREES:
         raise InputError(f"{count} trees of bit {kind.bit}", expected=f"at most {MOST_TREES}")
-    ids = np.arange(count, dtype=np.int64)
+    ids = np.arange(count, dtype=np.int32)
     look = uniforms_of(seed, STREAM_SCENERY, ids, kind.bit, number * (_TRIES + 1))
     x, y = np.full(count, np.nan), np.full(count, np.nan)
     if count:
@@ -231,7 +236,7 @@ def _place(
     spots = None
     if kind.least_distance_m > 0.0:
         spots = Spots(features.size_m, kind.least_distance_m, periodic=False)
-    waiting = np.arange(len(x), dtype=np.int64)
+    waiting = np.arange(len(x), dtype=np.int32)
     for attempt in range(_TRIES if spots else 1):
         draws = uniforms_of(
             seed, STREAM_SCENERY, waiting, kind.bit, number * (_TRIES + 1) + 1 + attempt
@@ -249,7 +254,7 @@ def _place(
 
 
 def _settle(
-    spots: Spots, trees: NDArray[np.int64], x: NDArray[np.float64], y: NDArray[np.float64]
+    spots: Spots, trees: NDArray[np.int32], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Take the spots that are free, one tree after the other; tell which were."""
     free = np.zeros(len(trees), np.bool_)

@@ -60,7 +60,11 @@ class Grass:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        for name, most in (("height_m", 5.0), ("per_m2", _MOST_PER_M2 / _CELL_M**2), ("curve", 1.0)):
+        for name, most in (
+            ("height_m", 5.0),
+            ("per_m2", _MOST_PER_M2 / _CELL_M**2),
+            ("curve", 1.0),
+        ):
             value = getattr(self, name)
             if not 0.0 <= value <= most:
                 raise InputError(f"{name} of grass is {value}", expected=f"0 to {most:g}")
@@ -202,6 +206,4 @@ def _blades(
     grain = 0.8 + 0.4 * look[:, :1]
     yellow = np.column_stack((0.9 + 0.25 * look[:, 1], np.ones(len(foot)), 1.0 - 0.2 * look[:, 1]))
     colour = shade * (grain * light[:, None] * yellow)[:, None] * np.asarray(tint)
-    return Blades(
-        vertices.astype(np.float32), (255.0 * np.clip(colour, 0.0, 1.0)).astype(np.uint8)
-    )
+    return Blades(vertices.astype(np.float32), (255.0 * np.clip(colour, 0.0, 1.0)).astype(np.uint8))

@@ -176,7 +176,9 @@ def _read_esri(path: Path) -> HeightField:
         raise input_error(f"not an ESRI grid: {error}", where=path.name) from None
     for word in ("ncols", "nrows", "cellsize"):
         if not header.get(word, 0.0) > 0.0:
-            raise input_error(f"no {word} in the header", where=path.name, expected=f"{word} above 0")
+            raise input_error(
+                f"no {word} in the header", where=path.name, expected=f"{word} above 0"
+            )
     rows, columns = int(header["nrows"]), int(header["ncols"])
     if len(values) != rows * columns:
         raise input_error(

@@ -21,7 +21,7 @@ from forest.view.scenery.scenery import Scenery
 
 _SHADOW_CELL_M = 0.25
 _MOST_SHADOW_CELLS = 4_000_000
-_WIDEST_PX = 12  # lines and points are drawn up to this many fine pixels wide
+_WIDEST_PX = 8  # lines and points are drawn up to this many fine pixels wide
 _NEAR_M, _FAR_M = 0.15, 12_000.0
 _BLADE_WIDTH_M = 0.006
 _GRAIN, _FACE_GRAIN = 0.2, 0.07  # of lines and points, and of faces, which the sun tells apart
@@ -251,7 +251,7 @@ def _grained(
     x, y, z = vertices.reshape(len(vertices), -1)[:, :3].T
     chance = np.modf(np.abs(np.sin(x * 12.9898 + y * 78.233 + z * 37.719)) * 4375.85)[0]
     grained = colour * (1.0 + grain * (2.0 * chance[:, None] - 1.0))
-    return np.clip(grained, 0.0, 255.0).astype(np.uint8)
+    return np.asarray(np.clip(grained, 0.0, 255.0), np.uint8)
 
 
 def _cells(count: int, corners: int) -> NDArray[np.int64]:

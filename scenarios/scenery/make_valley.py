@@ -32,7 +32,9 @@ def main() -> None:
     away = np.abs(north - brook)
     slope = np.maximum(away - 45.0, 0.0)
     heights = 2.5 * (1.0 - np.exp(-away / 12.0)) + 0.02 * away + 0.0011 * slope**2
-    heights = np.clip(heights + 1.2 * noise(1, 9.0) * np.clip(away / 40.0, 0.1, 1.0), 0.0, HIGHEST_M)
+    heights = np.clip(
+        heights + 1.2 * noise(1, 9.0) * np.clip(away / 40.0, 0.1, 1.0), 0.0, HIGHEST_M
+    )
 
     bits = np.where(away < 5.0, TALL, MEADOW)
     track = np.abs(north - (62.0 + 0.16 * east)) < 2.5

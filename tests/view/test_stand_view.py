@@ -106,9 +106,7 @@ def test_trees_stand_on_the_slope(scene: Path) -> None:
         ("[camera]", '[terrain]\nheights = "no.asc"\n[camera]', "terrain.heights"),
     ],
 )
-def test_wrong_scenes_are_refused_in_one_line(
-    scene: Path, old: str, new: str, says: str
-) -> None:
+def test_wrong_scenes_are_refused_in_one_line(scene: Path, old: str, new: str, says: str) -> None:
     assert old in SCENE
     bad = scene.with_name("bad.toml")
     bad.write_text(SCENE.replace(old, new))

@@ -257,4 +257,3 @@ def _sample(row: Trees, folder: Path) -> tuple[Model, float]:
             raise InputError(f"tree {row.sample} is no sample tree", expected=expected)
         year = int(run.sample_years(row.sample)[-1]) if row.year is None else row.year
         return simulated_model(run.skeleton(row.sample, year), run.scenario.species)
-

@@ -66,9 +66,7 @@ def colours_of(species: str, *, evergreen: bool) -> Colours:
     if evergreen:
         dull = _mixed(summer, (0.30, 0.33, 0.22), 0.25)
         young = _mixed(summer, _FRESH, 0.25)
-        return Colours(
-            bark, {"spring": young, "summer": summer, "fall": summer, "winter": dull}
-        )
+        return Colours(bark, {"spring": young, "summer": summer, "fall": summer, "winter": dull})
     fall = _FALL.get(species, (0.75, 0.52, 0.15))
     return Colours(
         bark,

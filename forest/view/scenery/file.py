@@ -24,14 +24,18 @@ class Terrain(Table):
     """The ground; level unless a file says otherwise."""
 
     heights: str | None = quantity(
-        None, "file of heights beside the scene: .npy, .png or .asc; row 0 is the north edge", unit=""
+        None,
+        "file of heights beside the scene: .npy, .png or .asc; row 0 is the north edge",
+        unit="",
     )
     size_m: tuple[_Length, _Length] = quantity(
         (100.0, 100.0), "width and depth of level ground", unit="m"
     )
     cell_m: float = quantity(1.0, "side of a cell of the file", unit="m", gt=0.0, le=1e5)
     origin_m: _Place = quantity((0.0, 0.0), "its south-west corner", unit="m")
-    height_range_m: _Place = quantity((0.0, 100.0), "heights of black and white in a .png", unit="m")
+    height_range_m: _Place = quantity(
+        (0.0, 100.0), "heights of black and white in a .png", unit="m"
+    )
 
 
 class Features(Table):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +108,9 @@ def scenery_of_run(
     stand_in = 0
     for k, name in enumerate(names):
         if known.get(name):
-            best = min(known[name], key=lambda s: (s.tree_id != ids[k], abs(s.height_m - heights[k])))
+            best = min(
+                known[name], key=lambda s: (s.tree_id != ids[k], abs(s.height_m - heights[k]))
+            )
             model[k], as_it_is[k] = best.model, best.tree_id == ids[k]
         else:
             seed = int(ids[k]) % _STAND_IN_SEEDS
@@ -145,9 +147,9 @@ class _Around(NamedTuple):
 
     extent: tuple[float, float, float, float]
 
-    def __call__(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def __call__(self, x: Any, y: Any) -> NDArray[np.uint8]:
         x0, y0, x1, y1 = self.extent
-        return ((x < x0) | (x > x1) | (y < y0) | (y > y1)).astype(np.uint8)
+        return np.asarray((x < x0) | (x > x1) | (y < y0) | (y > y1), np.uint8)
 
 
 def _year(run: Run, year: int | None) -> int:
@@ -185,7 +187,8 @@ def _shapes_on_record(
         kept = [s for k, s in enumerate(trees) if k in even or s.tree_id in samples]
         for skeleton in kept:
             number = stock.number(
-                skeleton.tree_id, lambda s=skeleton: simulated_model(s, run.scenario.species)  # type: ignore[misc]
+                skeleton.tree_id,
+                lambda s=skeleton: simulated_model(s, run.scenario.species),  # type: ignore[misc]
             )
             known.setdefault(name, []).append(
                 _Shape(stock.heights[number], number, skeleton.tree_id)

@@ -126,7 +126,7 @@ class Scenery:
         return x, y, float(self.terrain.at(x, y)) + above_m
 
     def camera(self) -> Camera:
-        """Give the camera of the view; unless told otherwise, from before the south edge, inwards."""
+        """Give the camera; unless told otherwise it looks from before the south edge inwards."""
         x0, y0, x1, y1 = self.extent
         heights = self.tree_heights
         top = float(np.quantile(heights, 0.9)) if len(heights) else 2.0
