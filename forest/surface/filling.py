@@ -82,7 +82,7 @@ class Out(NamedTuple):
 def count(part: Elements, share: NDArray[np.float64]) -> NDArray[np.int64]:
     """Count the primitives that are drawn of a list at each share."""
     found = np.empty(len(share), np.int64)
-    _count(part.first, np.int64(part.mass), share, found)
+    _count(part.first, np.int64(part.mass), np.ascontiguousarray(share), found)
     return found
 
 
