@@ -152,11 +152,12 @@ def draw_stand_view(
     from PIL import Image
 
     to = Path(to)
+    cameras = list(_around(scenery, frames))
     view = StandView(scenery, shadows=shadows)
     say(f"{len(scenery.instances.model)} trees of {len(scenery.models)} shapes")
     pictures = []
     written = []
-    for number, camera in enumerate(_around(scenery, frames)):
+    for number, camera in enumerate(cameras):
         picture = Image.fromarray(view.picture(camera))
         if to.suffix.lower() == ".gif":
             pictures.append(picture.quantize(255))

@@ -26,14 +26,14 @@ cell_m = 3.0
 [[trees]]
 bit = 2
 species = "lilac"
-leaf_number = 0.1
+most_leaves = 900
 per_ha = 400.0
 variants = 2
 [[tree]]
 x_m = 15.0
 y_m = 18.0
 species = "lilac"
-leaf_number = 0.1
+most_leaves = 900
 height_m = 6.0
 [[grass]]
 code = 2
@@ -94,15 +94,15 @@ def test_trees_stand_on_the_slope(scene: Path) -> None:
     ("old", "new", "says"),
     [
         ('season = "summer"', 'season = "sumer"', "season: 'sumer' is not allowed"),
-        ("leaf_number = 0.1\nper_ha", "leaf_nmber = 0.1\nper_ha", "did you mean 'leaf_number'"),
+        ("most_leaves = 900\nper_ha", "most_leafs = 900\nper_ha", "did you mean 'most_leaves'"),
         ("bit = 2", "bit = 14", r"trees\[0\].bit"),
-        ('species = "lilac"\nleaf_number = 0.1\nper', 'species = "lila"\nper', "mean 'lilac'"),
+        ('species = "lilac"\nmost_leaves = 900\nper', 'species = "lila"\nper', "mean 'lilac'"),
         ("variants = 2", "scale_min = 2.0", r"trees\[0\].scale_max"),
         ("map.npy", "maps.npy", "features.map"),
         ("code = 2", "code = 4", r"grass\[0\].code"),
         ('map = "map.npy"', "", "missing key 'map'"),
         ('[features]\nmap = "map.npy"\ncell_m = 3.0\n', "", "spread over no map"),
-        ('species = "lilac"\nleaf_number = 0.1\nper', "per", "needs either species or run"),
+        ('species = "lilac"\nmost_leaves = 900\nper', "per", "needs either species or run"),
         ("[camera]", '[terrain]\nheights = "no.asc"\n[camera]', "terrain.heights"),
     ],
 )

@@ -105,6 +105,13 @@ class Stock:
         return self._known[key]
 
 
+def grow_light(parameters: Parameters, seed: int, most_leaves: int) -> ParametricTree:
+    """Grow a parametric tree with about `most_leaves` at most; fewer leaves are larger ones."""
+    tree = grow(parameters, seed)
+    leaves = len(tree.leaves.stem)
+    return tree if leaves <= most_leaves else grow(parameters, seed, quality=most_leaves / leaves)
+
+
 def parametric_model(tree: ParametricTree, looks_like: str = "") -> tuple[Model, float]:
     """Make the model of a parametric tree, and give its height, m.
 
@@ -205,8 +212,8 @@ def _stand(
         with _told(where, f"tree[{number}].species"):
             parameters = _parameters(tree.species, folder)
         one = stock.number(
-            (tree.species, tree.seed, tree.leaf_number),
-            _growth(parameters, tree.seed, tree.leaf_number),
+            (tree.species, tree.seed, tree.most_leaves),
+            _growth(parameters, tree.seed, tree.most_leaves),
         )
         factor = 1.0 if tree.height_m is None else tree.height_m / stock.heights[one]
         model.append(np.array([one]))
@@ -229,16 +236,16 @@ def _variants(row: Trees, folder: Path, where: str, stock: Stock) -> list[int]:
         parameters = _parameters(row.species, folder)
     return [
         stock.number(
-            (row.species, seed, row.leaf_number), _growth(parameters, seed, row.leaf_number)
+            (row.species, seed, row.most_leaves), _growth(parameters, seed, row.most_leaves)
         )
         for seed in range(row.seed, row.seed + row.variants)
     ]
 
 
 def _growth(
-    parameters: Parameters, seed: int, leaf_number: float
+    parameters: Parameters, seed: int, most_leaves: int
 ) -> Callable[[], tuple[Model, float]]:
-    return lambda: parametric_model(grow(parameters, seed, quality=leaf_number))
+    return lambda: parametric_model(grow_light(parameters, seed, most_leaves))
 
 
 def _parameters(species: str, folder: Path) -> Parameters:

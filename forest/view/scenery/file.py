@@ -64,8 +64,8 @@ class Trees(Table):
     )
     variants: int = quantity(3, "trees of other seeds that are mixed", ge=1, le=100)
     seed: int = quantity(0, "seed of the first variant", ge=0, le=2**62)
-    leaf_number: float = quantity(
-        1.0, "factor on the number of leaves; their area in all stays", gt=0.0, le=1.0
+    most_leaves: int = quantity(
+        20_000, "leaves of a tree at most; fewer are larger, their area in all stays", ge=1
     )
     scale_min: float = quantity(0.8, "least factor on the size", gt=0.0, le=100.0)
     scale_max: float = quantity(1.1, "greatest factor on the size", gt=0.0, le=100.0)
@@ -89,8 +89,8 @@ class Tree(Table):
     species: str = quantity(..., "parametric species, or a TOML file of one", unit="")
     height_m: float | None = quantity(None, "height; its own if not given", unit="m", gt=0, le=300)
     seed: int = quantity(0, "each seed is another tree", ge=0, le=2**62)
-    leaf_number: float = quantity(
-        1.0, "factor on the number of leaves; their area in all stays", gt=0.0, le=1.0
+    most_leaves: int = quantity(
+        20_000, "leaves of a tree at most; fewer are larger, their area in all stays", ge=1
     )
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError
-from forest.parametric import grow
+from forest.parametric import load_parameters
 from forest.record.run import Run
 from forest.species import Species
 from forest.surface.grass import GRASSES
@@ -17,7 +17,7 @@ from forest.surface.instances import Instances, Model
 from forest.surface.terrain import HeightField
 from forest.trees.leaves import leaves_of
 from forest.trees.skeleton import Skeleton
-from forest.view.scenery.build import Stock, parametric_model
+from forest.view.scenery.build import Stock, grow_light, parametric_model
 from forest.view.scenery.colours import colours_of
 from forest.view.scenery.scenery import Scenery
 
@@ -31,7 +31,10 @@ STAND_INS: Mapping[str, str] = {
     "generic_deciduous": "quaking_aspen",
 }
 
+_Codes = NDArray[np.uint8]
+
 _STAND_IN_SEEDS = 3
+_MOST_LEAVES = 20_000
 #: Shapes of a species that are kept at most; other trees take the one that is nearest in height.
 MOST_SHAPES = 60
 
@@ -136,20 +139,20 @@ def scenery_of_run(
         terrain=HeightField.flat(),
         extent=extent,
         grasses={1: GRASSES[grass]} if grass else {},
-        grass_at=_Around(extent),
+        grass_at=_grass_around(extent),
         ground=_LITTER,
         notes=_told(year, as_it_is, stand_in, names, tile),
     )
 
 
-class _Around(NamedTuple):
-    """Grass of code 1 outside a rectangle: within it lies litter."""
+def _grass_around(extent: tuple[float, float, float, float]) -> Callable[[Any, Any], _Codes]:
+    """Let grass of code 1 grow outside a rectangle: within it lies litter."""
+    x0, y0, x1, y1 = extent
 
-    extent: tuple[float, float, float, float]
-
-    def __call__(self, x: Any, y: Any) -> NDArray[np.uint8]:
-        x0, y0, x1, y1 = self.extent
+    def code_at(x: Any, y: Any) -> _Codes:
         return np.asarray((x < x0) | (x > x1) | (y < y0) | (y > y1), np.uint8)
+
+    return code_at
 
 
 def _year(run: Run, year: int | None) -> int:
@@ -200,7 +203,10 @@ def _stand_in(species: str, seed: int, group: str, stock: Stock) -> int:
     """Give the model of a parametric tree in the colours of a simulated species."""
     parametric = STAND_INS.get(species, "balsam_fir" if group == "conifer" else "quaking_aspen")
     return stock.number(
-        ("stand-in", species, seed), lambda: parametric_model(grow(parametric, seed), species)
+        ("stand-in", species, seed),
+        lambda: parametric_model(
+            grow_light(load_parameters(parametric), seed, _MOST_LEAVES), species
+        ),
     )
 
 
