@@ -33,7 +33,7 @@ _FALL: dict[str, RGB] = {
     "fagus_sylvatica": (0.72, 0.42, 0.13),
     "quercus_robur": (0.60, 0.44, 0.18),
     "quaking_aspen": (0.92, 0.72, 0.12),
-    "black_tupelo": (0.70, 0.20, 0.10),
+    "black_tupelo": (0.60, 0.24, 0.12),
     "sassafras": (0.86, 0.45, 0.12),
     "weeping_willow": (0.76, 0.68, 0.22),
     "california_black_oak": (0.76, 0.50, 0.12),
