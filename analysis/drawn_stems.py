@@ -28,7 +28,7 @@ from forest.record.run import Run  # noqa: E402
 from forest.view.looks import look_of  # noqa: E402
 
 #: Heights per tree height at which diameters are compared.
-RELATIVE_HEIGHTS = np.linspace(0.05, 0.95, 19)
+RELATIVE_HEIGHTS = np.arange(1, 20) / 20.0
 UPPER = 0.7
 _PERCENT = 100.0
 
@@ -37,16 +37,15 @@ def both_stems(run: Run) -> tuple[pd.DataFrame, Stems, Stems]:
     """Give the living sample trees' rows of `/trees`, their true stems and the drawn ones."""
     year = int(run.years[-1])
     shapes = sample_skeletons(run, year)
-    enough(shapes, "living sample tree", run)
     trees = run.read("trees", years=(year, year)).set_index("tree_id")
+    shapes = [shape for shape in shapes if trees["dbh_cm"][shape.tree_id] > 0.0]
+    enough(shapes, "living sample tree of 1.3 m", run)
     rows = trees.loc[[shape.tree_id for shape in shapes]].reset_index()
     rows["species"] = rows["species"].astype(str)
-    tall = (rows["stem_volume_m3"] > 0.0).to_numpy()
-    rows = rows[tall].reset_index(drop=True)
     of = {one.name: one.mensuration for one in run.scenario.species_list}
     bark = np.array([of[name].bark_factor for name in rows["species"]])
     rows["stump_m"] = [of[name].stump_height_m for name in rows["species"]]
-    true = stems_of_skeletons([s for s, use in zip(shapes, tall, strict=True) if use], bark)
+    true = stems_of_skeletons(shapes, bark)
     rings = run.read("rings", RINGS_READ, years=(int(run.years[0]), year))
     return rows, true, taper_stems(rows, disc_diameters(rings), bark)
 
@@ -82,7 +81,7 @@ def table(rows: pd.DataFrame, excess: np.ndarray) -> pd.DataFrame:
         together; `tree_error`: median over trees of the difference, per true worth;
         `upper_excess_cm`: mean by which a drawn stem is too thick from 0.7 of the height up.
     """
-    upper = np.nanmean(excess[:, RELATIVE_HEIGHTS >= UPPER], axis=1)
+    upper = excess[:, RELATIVE_HEIGHTS >= UPPER].mean(axis=1)
     found = []
     for species, of in rows.assign(upper=upper).groupby("species"):
         sold = of[of["true"] > 0.0]
