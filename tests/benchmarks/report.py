@@ -150,12 +150,13 @@ def _frame_lines(frames: dict[str, Any]) -> Iterator[Line]:
     one, most = (frames["threads"][key(frames["threads"])] for key in (min, max))
     seen = f"{frames['seen']:,} seen, {frames['primitives'] / 1e6:.1f} million primitives"
     yield Line(f"A view of {frames['trees']:,} aspens of 8 models: {seen}", ())
-    for key, what in (
-        ("plain_s", "the frame without shade, s"),
-        ("shaded_s", "the frame, s"),
-        ("shaded_million_s", "the frame, s per million primitives"),
+    for key, busy, what in (
+        ("plain_s", "", "the frame without shade, s"),
+        ("shaded_s", "shaded_cpu_s", "the frame, s"),
+        ("million_s", "million_cpu_s", "the frame, s per million primitives"),
     ):
-        cells = (f"{most[key]:.3g}", "", f"{one[key]:.3g}", f"{one[key] / most[key]:.2f}")
+        cpu = f"{most[busy]:.3g}" if busy else ""
+        cells = (f"{most[key]:.3g}", cpu, f"{one[key]:.3g}", f"{one[key] / most[key]:.2f}")
         yield Line(what, cells)
     for key, what in (
         ("lists_s", "once: the models' lists, s"),
