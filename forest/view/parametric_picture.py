@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.parametric import ParametricTree
+from forest.parametric import Parameters, ParametricTree
 from forest.record.export import whole_file
 from forest.trees.leaves import OUTLINES, Leaves
 from forest.view import shapes
@@ -17,16 +17,15 @@ from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, save
 from forest.view.shading import LightVolume
 from forest.view.shapes import gather_wood, polylines
 
-#: Colour of the leaves in each season.
-SEASONS = {
-    "spring": (0.42, 0.58, 0.22),
-    "summer": (0.22, 0.42, 0.14),
-    "fall": (0.72, 0.48, 0.12),
-    "winter": (0.20, 0.36, 0.16),
-}
+#: The seasons, and how young the leaves are in each, 0 to 1.
+SEASONS = {"spring": 0.5, "summer": 0.0, "fall": 0.0, "winter": 0.0}
+
+_YOUNG = np.array([0.60, 0.72, 0.30])  # colour of leaves that have just unfolded
 
 _MOST_LEAVES = 800_000
 _SIDES = 6
+_FROM_THE_SIDES = 0.4
+_POINTS_PER_LOBE = 8
 _LEAST_WIDTH = 0.0004  # of the picture's height
 
 
@@ -63,6 +62,100 @@ def has_leaves(tree: ParametricTree, season: str) -> bool:
     return season != "winter" or tree.parameters.evergreen
 
 
+def colour_of(text: str) -> NDArray[np.float64]:
+    """Read `#rrggbb` as shares of red, green and blue."""
+    return np.array([int(text[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+
+
+def leaf_colour(parameters: Parameters, season: str) -> NDArray[np.float64]:
+    """Colour of the leaves in a season of `SEASONS`, as shares of red, green and blue."""
+    falls = season == "fall" and not parameters.evergreen
+    colour = colour_of(parameters.fall_colour if falls else parameters.leaf_colour)
+    young = 0.0 if parameters.evergreen else SEASONS[season]
+    return np.asarray((1.0 - young) * colour + young * _YOUNG)
+
+
+class TreeScene(Scene):
+    """One parametric tree in its species' colours, with its lobes.
+
+    Parameters
+    ----------
+    tree : ParametricTree
+        The tree.
+    leaves : bool
+        Whether to show leaves, where the season has any.
+    season : str
+        One of `SEASONS`.
+    """
+
+    def __init__(
+        self, tree: ParametricTree, *, leaves: bool = True, season: str = "summer"
+    ) -> None:
+        points, skeleton = tree.nodes.position, tree.skeleton()
+        size = max(2.0 * np.abs(points[:, :2]).max(), points[:, 2].max())
+        super().__init__([skeleton], leaves=False, least_radius_m=_LEAST_WIDTH * size)
+        self.bark = colour_of(tree.parameters.bark_colour)
+        wood = replace(self.wood, bark=np.broadcast_to(self.bark, self.wood.bark.shape))
+        self.tree, self.lobed = tree, lobed_stems(tree)
+        drawn = skeleton.axis[skeleton.length > 1e-6]  # as `gather_wood` has them
+        self.wood = wood.part(~np.isin(drawn, self.lobed))
+        if leaves and has_leaves(tree, season) and len(tree.leaves.stem):
+            self.leaves, self.card_scale = _blades(tree, season)
+            area = self.leaves.area * self.card_scale**2
+            self.light = LightVolume(self.leaves.place, area, (self.lower, self.upper))
+            # The sky's light comes from above there; a lone tree has it from the sides too.
+            self.light.sky = _FROM_THE_SIDES + (1.0 - _FROM_THE_SIDES) * self.light.sky
+
+    def add_to(self, plotter: Any) -> None:
+        """Put wood and leaves into a plotter."""
+        super().add_to(plotter)
+        pv = import_pyvista()
+        for stem in self.lobed:
+            points, faces = lobed_tube(self.tree, int(stem))
+            mesh = pv.PolyData(points, faces).compute_normals(split_vertices=False)
+            normals = np.asarray(mesh.point_data["Normals"], np.float64)
+            bark = np.broadcast_to(self.bark, points.shape)
+            mesh["rgb"] = self.lit_bark(np.asarray(mesh.points, np.float64), normals, bark)
+            plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
+
+
+def lobed_stems(tree: ParametricTree) -> NDArray[np.int64]:
+    """Stems with lobes: the trunk and its clones; of a plant without leaves, a cactus, all."""
+    parameters = tree.parameters
+    if parameters.lobes == 0 or parameters.lobe_depth == 0.0:
+        return np.empty(0, np.int64)
+    return np.flatnonzero((tree.stems.level == 0) | (parameters.leaves == 0))
+
+
+def lobed_tube(tree: ParametricTree, stem: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Give the surface of a stem with lobes, closed at its end (Weber & Penn 1995, 4.4).
+
+    Returns
+    -------
+    points : float64 (n, 3)
+        Corners, ring by ring, m.
+    faces : int64
+        Quadrangles in VTK's way, [4, corner, corner, corner, corner, 4 ...].
+    """
+    lobes, depth = tree.parameters.lobes, tree.parameters.lobe_depth
+    first = tree.stems.first[stem]
+    rows = np.arange(first, first + tree.stems.nodes[stem])
+    place, side = tree.nodes.position[rows], tree.nodes.side[rows]
+    across = np.cross(tree.nodes.heading[rows], side)
+    n = _POINTS_PER_LOBE * lobes
+    angle = 2.0 * np.pi * np.arange(n) / n
+    out = (
+        np.cos(angle)[:, None] * side[:, None, :] + np.sin(angle)[:, None] * across[:, None, :]
+    ) * (1.0 + depth * np.sin(lobes * angle))[:, None]
+    rings = place[:, None, :] + tree.nodes.radius[rows][:, None, None] * out
+    rings = np.concatenate((rings, np.broadcast_to(place[-1], (1, n, 3))))
+    low = np.arange((len(rings) - 1) * n).reshape(-1, n)
+    beside = np.roll(low, -1, axis=1)
+    corners = np.stack((low, beside, beside + n, low + n), axis=2).reshape(-1, 4)
+    faces = np.column_stack((np.full(len(corners), 4), corners)).ravel()
+    return rings.reshape(-1, 3), faces
+
+
 def draw_parametric(
     tree: ParametricTree,
     to: str | Path,
@@ -86,15 +179,9 @@ def draw_parametric(
     window : tuple of int
         Width and height of the picture, pixels.
     """
-    skeleton = tree.skeleton()
     points = tree.nodes.position
     reach, top = np.abs(points[:, :2]).max() + 0.1, points[:, 2].max()
-    scene = Scene([skeleton], leaves=False, least_radius_m=_LEAST_WIDTH * max(2.0 * reach, top))
-    if leaves and has_leaves(tree, season) and len(tree.leaves.stem):
-        blades, scene.card_scale = _blades(tree, season)
-        scene.leaves = blades
-        bounds = (scene.lower, scene.upper)
-        scene.light = LightVolume(blades.place, blades.area * scene.card_scale**2, bounds)
+    scene = TreeScene(tree, leaves=leaves, season=season)
     plotter = open_plotter(window)
     plotter.set_background("white")
     scene.add_to(plotter)
@@ -163,7 +250,7 @@ def _blades(tree: ParametricTree, season: str) -> tuple[Blades, float]:
     blades = Blades(
         place=some.position,
         along=some.direction * some.length[:, None],
-        colour=grain[:, None] * np.asarray(SEASONS[season]),
+        colour=grain[:, None] * leaf_colour(tree.parameters, season),
         needles=np.zeros(len(chosen), np.bool_),
         normal=some.normal,
         width=some.width,
