@@ -47,7 +47,7 @@ class Plate(NamedTuple):
     changes: tuple[str, ...] = ()
 
 
-#: The willow as printed bears a leaf area of 200 m2 on each m2 of ground: too much to look into.
+#: The willow as printed has some 140 m2 of leaf over each m2 of ground: too much to look into.
 WILLOW = ("3Branches=20",)
 
 SPECIES = {
@@ -126,6 +126,7 @@ def compose(
     wide = [[max(image.width, _width(words)) for image, words in row] for row in rows]
     width = max(sum(row) + gap * (len(row) + 1) for row in wide)
     width = max(width, _width(title, 17) + 28)
+    bar_m = bar_m if bar_m * px_per_m < 0.8 * width else 1.0
     heights = [max(image.height for image, _ in row) + _FOOT for row in rows]
     sheet = Image.new("RGB", (width, sum(heights) + 64), "white")
     pen = ImageDraw.Draw(sheet)
@@ -137,11 +138,14 @@ def compose(
         for (image, words), slot in zip(row, slots, strict=True):
             sheet.paste(image, (x + (slot - image.width) // 2, ground - _FOOT - image.height))
             middle = (x + slot // 2, ground - _FOOT + 8)
-            pen.multiline_text(middle, words, fill=_DARK, font=_font(14), anchor="ma", align="center")
+            pen.multiline_text(
+                middle, words, fill=_DARK, font=_font(14), anchor="ma", align="center"
+            )
             x += slot + gap
     y, end = sheet.height - 16, width - 14
-    pen.line([(end - bar_m * px_per_m, y), (end, y)], fill=_DARK, width=3)
-    pen.text((end - bar_m * px_per_m - 8, y), f"{bar_m:g} m", fill=_DARK, font=_font(14), anchor="rm")
+    start = end - bar_m * px_per_m
+    pen.line([(start, y), (end, y)], fill=_DARK, width=3)
+    pen.text((start - 8, y), f"{bar_m:g} m", fill=_DARK, font=_font(14), anchor="rm")
     return sheet
 
 
@@ -174,7 +178,7 @@ def draw_species(name: str, to: Path = TO, *, height_px: int = 560) -> None:
 
 def draw_plate_1(to: Path = TO) -> None:
     """Draw all species at one scale."""
-    px_per_m, shown = 21.0, []
+    px_per_m, shown = 18.0, []
     for name in SPECIES:
         tree = tree_of(name)
         words = tree.parameters.common_name.split(",")[0].replace(" ", "\n", 1)
