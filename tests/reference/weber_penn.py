@@ -266,8 +266,12 @@ class Tree:
                 continue
             if turned is None:
                 turned = level.rotate * j
-            u, v, w, _ = draw(self.seed, stem.key, (OF_LEAF if last else OF_CHILD) + j)
-            turned = self.child(stem, level, j, count, z, turned, (u, v, w), last, base)
+            if last:  # a draw serves two leaves
+                four = draw(self.seed, stem.key, OF_LEAF + j // 2)
+                chance = (*four[2 * (j % 2) : 2 * (j % 2) + 2], 0.0)
+            else:
+                chance = draw(self.seed, stem.key, OF_CHILD + j)[:3]
+            turned = self.child(stem, level, j, count, z, turned, chance, last, base)
 
     def child(
         self, stem: Stem, level: Level, j: int, count: int, z: float, turned: float,
