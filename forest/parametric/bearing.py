@@ -1,7 +1,7 @@
 """What stems bear: the next level's stems, and leaves (Weber & Penn 1995, 4.3, 4.5, 4.9).
 
 Children stand at even distances along the course of a family, from the bare base up; a clone
-bears those of its own part.
+bears those of its own part. Those of a fan all stand at the end.
 """
 
 from __future__ import annotations
@@ -70,6 +70,12 @@ def around(level: Any, j: Any, u: Any, turned: Any) -> Any:
 
 
 @njit
+def fanned(level: Any, j: Any, count: Any) -> Any:
+    """Turn of one of a fan's members in its plane; nRotate is the fan's angle (4.5), radians."""
+    return ((j + 0.5) / count - 0.5) * level.rotate * _DEGREE
+
+
+@njit
 def down_angle(level: Any, ratio: Any, u: Any) -> Any:
     """Angle between child and parent, radians (4.3); `ratio` is 0 at the parent's top."""
     if level.down_angle_variation >= 0.0:
@@ -124,20 +130,26 @@ def _spring(
         row = np.int64(rows[i])
         length = shoots.length[i]
         bare = bare_share(number, t, length, whole.scale)
-        count = child_count(number, level.branches, False, shoots, i)
+        count = child_count(number, abs(level.branches), False, shoots, i)
         first = first_child(count, bare, shoots.start[i] / parent.segments)
         turned = level.rotate * first * _DEGREE
         for j in range(first, count):
             z = bare + (1.0 - bare) * (j + 0.5) / count
             a, b, c, _ = draw(whole.seed, shoots.key[i], OF_CHILD + j)
+            down = down_angle(level, (1.0 - z) / (1.0 - bare), b)
+            if level.branches < 0.0:
+                z = 1.0
+            ratio = (1.0 - z) / (1.0 - bare)
             node, far = node_at(number, parent, t, shoots, i, z)
             load_frame(f, sections.side, sections.heading, node)
             for k in range(3):
                 place[k] = sections.position[node, k] + far * f[6 + k]
-            ratio = (1.0 - z) / (1.0 - bare)
-            turned = around(level, j, a, turned)
-            turn_z(f, turned)
-            turn_x(f, down_angle(level, ratio, b))
+            if level.branches < 0.0:
+                turn_y(f, fanned(level, j, count))
+            else:
+                turned = around(level, j, a, turned)
+                turn_z(f, turned)
+            turn_x(f, down)
             most = max(0.0, level.length + either(c) * level.length_variation)
             if number == 0:
                 shape = shape_ratio(
@@ -235,7 +247,7 @@ def _bear(
             down = down_angle(level, (1.0 - z) / (1.0 - bare), b)
             if fan:
                 copy(f, at)
-                turn_y(f, ((j + 0.5) / count - 0.5) * level.rotate * _DEGREE)
+                turn_y(f, fanned(level, j, count))
                 turn_x(f, down)
             else:
                 turned = around(level, j, a, turned)

@@ -100,7 +100,7 @@ def _grow(
             break
         shoots, sections = grown.levels[-1]
         rows = np.empty(len(shoots.key), np.int64)
-        most = float(levels[number + 1]["branches"])
+        most = abs(float(levels[number + 1]["branches"]))
         count = count_children(number, tree, levels, scale, most, False, shoots, rows)
         _refuse(count, MOST_STEMS, "stems", number + 1)
         if not count:
@@ -258,7 +258,7 @@ def _alone(
     length, own = np.empty(len(origins.key)), (*own, scratch())
     run(probe_alone, number, tree, levels, whole, origins, before, own, length)
     kept = length > 0.0
-    row = np.cumsum(kept) - kept
+    row: Any = np.cumsum(kept) - kept
     run(grow_alone, number, tree, levels, whole, origins, before, own, length, row)
     return int(kept.sum())
 

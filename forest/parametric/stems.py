@@ -327,7 +327,7 @@ def grow_family(
                 if waiting + clones > room:
                     return error, np.int64(-1), m
                 if clones > 0:
-                    p[5] *= tree.clone_habit
+                    p[5] = tree.clone_habit if whole.printed else p[5] * tree.clone_habit
                     here = (stems_before + n, nodes_before + m - 1, key)
                     more = place_clones(clones, f, p, level, whole, s, here, pending, waiting)
                     waiting += clones

@@ -86,8 +86,9 @@ def _moments(
     nodes, leaves, joints = tree.nodes, tree.leaves, tree.joints
     n, m = len(nodes.z), len(leaves.stem)
     still = Still(
-        np.empty(n, np.int32), *(np.empty((n, 3)) for _ in range(3)),
-        np.empty((len(joints.key), 2)), *(np.empty((m, 3), np.float32) for _ in range(3)),
+        np.empty(n, np.int32), np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)),
+        np.empty((len(joints.key), 2)),
+        np.empty((m, 3), np.float32), np.empty((m, 3), np.float32), np.empty((m, 3), np.float32),
     )  # fmt: skip
     _settle(tree.stems, nodes, joints, np.uint64(tree.seed), still)
     in_threads(_settle_leaves, leaves, joints.leaf_node, nodes, scratch(), still)
@@ -111,6 +112,8 @@ def sway_angles(
 ) -> Any:
     """Turn about one axis of a joint, degrees; `wind` = (speed, gust, scaled time in s)."""
     speed, gust, time = wind
+    if radius <= 0.0:
+        return 0.0  # a stem from a parent's pointed end
     if z < 1.0 and radius_here > 0.0:
         stiff = 4.0 * length * (1.0 - z) / radius_here
     else:

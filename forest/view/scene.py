@@ -179,9 +179,14 @@ def save(plotter: Any, to: str | Path) -> None:
     """Render, average the fine pixels and write a PNG."""
     from PIL import Image
 
+    Image.fromarray(pixels(plotter)).save(Path(to))
+
+
+def pixels(plotter: Any) -> NDArray[np.uint8]:
+    """Render and average the fine pixels; gives (height, width, 3)."""
     fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
     plotter.close()
     k = _OVERSAMPLING
     height, width = fine.shape[0] // k, fine.shape[1] // k
     mean = fine[: height * k, : width * k, :3].reshape(height, k, width, k, 3).mean(axis=(1, 3))
-    Image.fromarray(mean.round().astype(np.uint8)).save(Path(to))
+    return np.asarray(mean.round().astype(np.uint8))

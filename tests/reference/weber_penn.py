@@ -248,7 +248,7 @@ class Tree:
         p, n = self.p, stem.level
         last = n + 1 == p.depth
         level = p.of_level(n + 1)
-        most = abs(p.leaves) if last else level.branches
+        most = abs(p.leaves if last else level.branches)
         share = 1 - 0.5 * stem.reach
         if n == 0:
             share = 1.0
@@ -279,7 +279,7 @@ class Tree:
     ) -> float:  # fmt: skip
         p = self.p
         u, v, w = chance
-        fan = last and p.leaves < 0
+        fan = (p.leaves if last else level.branches) < 0
         at = 1.0 if fan else z
         below = max(i for i in range(len(stem.z) - 1) if i == 0 or stem.z[i] <= at + 1e-12)
         f = stem.frame[below]
@@ -300,6 +300,8 @@ class Tree:
         if last:
             self.leaves.append((place, f))
             return turned
+        z = at
+        ratio = (stem.length * (1 - z)) / (stem.length - base)
         most = max(0.0, level.length + (2 * w - 1) * level.length_variation)
         length = most * (stem.length - 0.6 * z * stem.length)
         if stem.level == 0:
