@@ -24,7 +24,7 @@ from forest.parametric import ParametricTree, grow, load_parameters  # noqa: E40
 from forest.surface import Drawing, Sight, describe, fractions  # noqa: E402
 from forest.surface.description import LEAF_ITEM  # noqa: E402
 from forest.view.parametric_picture import TreeScene  # noqa: E402
-from forest.view.scene import open_plotter, shoot  # noqa: E402
+from forest.view.scene import open_plotter, pixels  # noqa: E402
 from forest.view.shading import shade  # noqa: E402
 
 TO = ROOT / "docs" / "gallery"
@@ -115,7 +115,7 @@ def panel(
     plotter.enable_parallel_projection()
     camera.parallel_scale = 0.5 * (top - bottom)
     plotter.renderer.ResetCameraClippingRange()
-    return Image.fromarray(shoot(plotter))
+    return Image.fromarray(pixels(plotter))
 
 
 def compose(
@@ -201,7 +201,8 @@ def draw_plate_2(to: Path = TO) -> None:
 def draw_plate_4(to: Path = TO) -> None:
     """Draw the aspen at the ranges of Table 2 from 30 m, zoomed by powers of two."""
     tree = tree_of("quaking_aspen")
-    whole = describe(tree.skeleton(), tree.leaves)
+    lobes = (tree.parameters.lobes, tree.parameters.lobe_depth)
+    whole = describe(tree.skeleton(), tree.leaves, lobes=lobes)
     top, panels = extent(tree)[1][2], []
     for power, range_m in enumerate(RANGES_M):
         shares = fractions(range_m, Sight(season="summer"), evergreen=False)
@@ -234,7 +235,7 @@ def _from_afar(tree: ParametricTree, drawing: Drawing, px_per_m: float) -> Image
     plotter.camera_position = [middle - np.array([0.0, 500.0, 0.0]), middle, (0, 0, 1)]
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = half
-    return Image.fromarray(shoot(plotter))
+    return Image.fromarray(pixels(plotter))
 
 
 def draw_plate_5(to: Path = TO) -> None:

@@ -47,7 +47,9 @@ class Level(Table):
         140.0, "turn about the parent from child to child; negative: sides alternate", **_ANGLE
     )
     rotate_variation: float = quantity(0.0, "± on it", **_SPREAD)
-    branches: int = quantity(0, "most children that a parent bears", ge=0, le=5000)
+    branches: int = quantity(
+        0, "most children that a parent bears; negative: in a fan at its end", ge=-5000, le=5000
+    )
 
 
 class Parameters(Table):

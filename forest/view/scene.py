@@ -181,18 +181,18 @@ def look_at(
     plotter.renderer.ResetCameraClippingRange()
 
 
-def shoot(plotter: Any) -> NDArray[np.uint8]:
-    """Render and average the fine pixels: (height, width, 3)."""
+def save(plotter: Any, to: str | Path) -> None:
+    """Render, average the fine pixels and write a PNG."""
+    from PIL import Image
+
+    Image.fromarray(pixels(plotter)).save(Path(to))
+
+
+def pixels(plotter: Any) -> NDArray[np.uint8]:
+    """Render and average the fine pixels; gives (height, width, 3)."""
     fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
     plotter.close()
     k = _OVERSAMPLING
     height, width = fine.shape[0] // k, fine.shape[1] // k
     mean = fine[: height * k, : width * k, :3].reshape(height, k, width, k, 3).mean(axis=(1, 3))
-    return np.asarray(mean.round(), np.uint8)
-
-
-def save(plotter: Any, to: str | Path) -> None:
-    """Render and write a PNG."""
-    from PIL import Image
-
-    Image.fromarray(shoot(plotter)).save(Path(to))
+    return np.asarray(mean.round().astype(np.uint8))
