@@ -219,7 +219,7 @@ def _polygons(points: NDArray[np.float64], corners: NDArray[np.int64]) -> Any:
 
 def _add_trunk(plotter: Any, tree: ParametricTree, light: LightVolume) -> None:
     mesh = _polygons(*lobed_trunk(tree)).compute_normals(
-        cell_normals=False, consistent_normals=False, auto_orient_normals=False, splitting=False
+        cell_normals=False, consistent_normals=False, auto_orient_normals=False
     )
     normals = np.asarray(mesh.point_data["Normals"], np.float64)
     sun, sky = light.at(np.asarray(mesh.points, np.float64))
