@@ -13,6 +13,8 @@ from forest.parametric import grow
 from forest.parametric.parameters import parametric_names
 from forest.view.parametric_picture import lobed_trunk
 
+_WILD = ("--set", "0SegSplits=9", "--set", "0CurveRes=50", "--set", "clone_habit=1")
+
 
 def _forest(*words: str) -> int:
     with pytest.raises(SystemExit) as end:
@@ -43,7 +45,21 @@ def test_tubes_and_leaves(tmp_path: Path) -> None:
 
 def test_picture(tmp_path: Path) -> None:
     to = tmp_path / "lilac.png"
-    words = ("lilac", "--set", "1Branches=3", "--season", "fall", "--wind", "3", "--time", "9")
+    words = (
+        "lilac",
+        "--set",
+        "1Branches=3",
+        "--set",
+        "Lobes=3",
+        "--set",
+        "LobeDepth=0.2",
+        "--season",
+        "fall",
+        "--wind",
+        "3",
+        "--time",
+        "9",
+    )
     assert _forest(*words, "--to", str(to)) == 0
     assert to.stat().st_size > 5_000
 
@@ -100,11 +116,8 @@ def test_species_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         (["lilac", "--to", "lilac.obj"], "unknown format '.obj'"),
         (["lilac", "--seed", "-1"], "seed -1 is not allowed"),
         (["lilac", "--set", "1CurveRes=0"], "level[1].segments: 0 is not allowed"),
-        (["lilac", "--set", "ScaleV=3.5"], "smaller than nothing"),
-        (
-            ["lilac", "--set", "0SegSplits=9", "--set", "0CurveRes=50", "--set", "clone_habit=1"],
-            "more than",
-        ),
+        (["lilac", "--set", "ScaleV=4.5"], "smaller than nothing"),
+        (["lilac", *_WILD], "more than"),
         (["lilac", "--set", "1Branches=5000", "--set", "2Branches=5000"], "more than"),
         (["lilac", "--quality", "0"], "quality 0 is not allowed"),
         (["lilac", "--wind", "nan"], "wind speed nan is not allowed"),
