@@ -88,10 +88,16 @@ class Scene:
         tubes = mesh.tube(scalars="radius", absolute=True, n_sides=8)
         normals = np.asarray(tubes.point_data["TubeNormals"], np.float64)
         points = np.asarray(tubes.points, np.float64)
+        tubes["rgb"] = self.lit_bark(points, normals, np.asarray(tubes["bark"]))
+        plotter.add_mesh(tubes, scalars="rgb", rgb=True, lighting=False)
+
+    def lit_bark(
+        self, points: NDArray[np.float64], normals: NDArray[np.float64], bark: NDArray[np.float64]
+    ) -> NDArray[np.uint8]:
+        """Colours of bark at points (n, 3) of these normals, lit by sun and sky."""
         sun, sky = self.light.at(points)
         around = 0.75 + 0.25 * normals[:, 2]
-        tubes["rgb"] = shade(np.asarray(tubes["bark"]), sun * _lambert(normals), 1.3 * sky * around)
-        plotter.add_mesh(tubes, scalars="rgb", rgb=True, lighting=False)
+        return shade(bark, sun * _lambert(normals), 1.3 * sky * around)
 
     def _add_twigs(self, plotter: Any, chosen: NDArray[np.int64]) -> None:
         if not len(chosen):
@@ -176,18 +182,18 @@ def look_at(
     plotter.renderer.ResetCameraClippingRange()
 
 
-def picture_of(plotter: Any) -> NDArray[np.uint8]:
-    """Render, average the fine pixels and give the picture (height, width, 3)."""
+def save(plotter: Any, to: str | Path) -> None:
+    """Render, average the fine pixels and write a PNG."""
+    from PIL import Image
+
+    Image.fromarray(pixels(plotter)).save(Path(to))
+
+
+def pixels(plotter: Any) -> NDArray[np.uint8]:
+    """Render and average the fine pixels; gives (height, width, 3)."""
     fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
     plotter.close()
     k = OVERSAMPLING
     height, width = fine.shape[0] // k, fine.shape[1] // k
     mean = fine[: height * k, : width * k, :3].reshape(height, k, width, k, 3).mean(axis=(1, 3))
-    return np.asarray(mean.round(), np.uint8)
-
-
-def save(plotter: Any, to: str | Path) -> None:
-    """Render, average the fine pixels and write a PNG."""
-    from PIL import Image
-
-    Image.fromarray(picture_of(plotter)).save(Path(to))
+    return np.asarray(mean.round().astype(np.uint8))

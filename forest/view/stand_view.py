@@ -16,7 +16,7 @@ from forest.surface.frame import Frame, prepare
 from forest.surface.grass import grow_grass
 from forest.surface.shadow import SceneShadow, scene_shadow
 from forest.view.landscape_ground import GRASS_TINT, ground, hazed, sky
-from forest.view.scene import OVERSAMPLING, import_pyvista, open_plotter, picture_of
+from forest.view.scene import OVERSAMPLING, import_pyvista, open_plotter, pixels
 from forest.view.scenery.scenery import Scenery
 
 _SHADOW_CELL_M = 0.25
@@ -88,7 +88,7 @@ class StandView:
         view.up = (0.0, 0.0, 1.0) if _is_upright(camera) else (0.0, 1.0, 0.0)
         view.view_angle = camera.field_of_view_deg
         view.clipping_range = (_NEAR_M, _FAR_M)
-        return picture_of(plotter)
+        return pixels(plotter)
 
     def _add_grass(self, plotter: Any, camera: Camera) -> None:
         scenery = self.scenery
@@ -261,8 +261,8 @@ def _cells(count: int, corners: int) -> NDArray[np.int64]:
     return np.column_stack((np.full(count, corners), index)).ravel()
 
 
-def _by_size(pixels: NDArray[Any]) -> Iterator[tuple[int, NDArray[np.int64]]]:
+def _by_size(wanted: NDArray[Any]) -> Iterator[tuple[int, NDArray[np.int64]]]:
     """Sort things into whole widths of fine pixels, for VTK draws one width at a time."""
-    size = np.clip(np.round(pixels), 1, _WIDEST_PX).astype(np.int64)
+    size = np.clip(np.round(wanted), 1, _WIDEST_PX).astype(np.int64)
     for one in np.unique(size):
         yield int(one), np.flatnonzero(size == one)

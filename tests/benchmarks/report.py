@@ -136,7 +136,12 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line("peak of the process, GB", (f"{tree['peak_gb']:.2f}",))
     forms = result["parametric"]
     yield Line("a parametric aspen, ms", (f"{1e3 * forms['aspen_s']:.1f}",))
-    yield Line("a leaf of a parametric willow, us", (f"{1e6 * forms['willow_leaf_s']:.2f}",))
+    willow = f"a parametric willow of {1e-6 * forms['willow_leaves']:.1f} million leaves, s"
+    yield Line(willow, (f"{forms['willow_s']:.2f}",))
+    threads = max(int(key.split("_")[2]) for key in forms if key.startswith("thousand_aspens"))
+    whole = f"{forms[f'thousand_aspens_{threads}_s']:.1f}"
+    yield Line(f"a thousand parametric aspens, {threads} threads, s", (whole,))
+    yield Line("an aspen's moment of wind, ms", (f"{1e3 * forms['sway_s']:.1f}",))
     yield from _frame_lines(result["frames"])
     starts = result["starts"]
     yield Line("Start", ())
