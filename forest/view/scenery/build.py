@@ -17,7 +17,7 @@ from forest.surface.feature_map import FeatureMap, Spreading, read_feature_map, 
 from forest.surface.grass import GRASSES, Grass
 from forest.surface.instances import Instances, Model
 from forest.surface.terrain import HeightField, read_heights
-from forest.view.scenery.colours import colours_of
+from forest.view.scenery.colours import colours_of, parametric_colours
 from forest.view.scenery.file import GrassTable, SceneFile, Trees
 from forest.view.scenery.scenery import Haze, Scenery, Viewpoint
 
@@ -115,10 +115,13 @@ def grow_light(parameters: Parameters, seed: int, most_leaves: int) -> Parametri
 def parametric_model(tree: ParametricTree, looks_like: str = "") -> tuple[Model, float]:
     """Make the model of a parametric tree, and give its height, m.
 
-    `looks_like` names the species whose colours it takes, if not its own.
+    `looks_like` names the simulated species whose colours it takes instead of its own.
     """
     parameters = tree.parameters
-    bark, foliage = colours_of(looks_like or parameters.name, evergreen=parameters.evergreen)
+    if looks_like:
+        bark, foliage = colours_of(looks_like, evergreen=parameters.evergreen)
+    else:
+        bark, foliage = parametric_colours(parameters)
     model = Model.of(
         tree.skeleton(), tree.leaves, evergreen=parameters.evergreen, bark=bark, foliage=foliage
     )
