@@ -50,7 +50,7 @@ def radius_at(taper: float, radius: float, length: float, z: float) -> float:
     """radius_Z of 4.4, without flare."""
     unit = taper if taper < 1 else max(0.0, 2 - taper)
     pure = radius * (1 - unit * z)
-    if taper < 1:
+    if taper < 1 or pure <= 0:
         return pure
     z2 = (1 - z) * length
     depth = 1.0 if taper < 2 or z2 < pure else taper - 2
