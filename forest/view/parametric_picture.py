@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.parametric import ParametricTree
+from forest.parametric import Parameters, ParametricTree
 from forest.parametric.ratios import lobed
 from forest.record.export import whole_file
 from forest.trees.leaves import OUTLINES, Leaves
 from forest.view import shapes
-from forest.view.looks import look_of
 from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, pixels
-from forest.view.shading import SUN, LightVolume, shade
+from forest.view.shading import LightVolume
 from forest.view.shapes import gather_wood, polylines
 
-#: Colour of the leaves in each season.
-SEASONS = {
-    "spring": (0.42, 0.58, 0.22),
-    "summer": (0.22, 0.42, 0.14),
-    "fall": (0.72, 0.48, 0.12),
-    "winter": (0.20, 0.36, 0.16),
-}
+#: The seasons, and how young the leaves are in each, 0 to 1.
+SEASONS = {"spring": 0.5, "summer": 0.0, "fall": 0.0, "winter": 0.0}
+
+_YOUNG = np.array([0.60, 0.72, 0.30])  # colour of leaves that have just unfolded
 
 _MOST_LEAVES = 800_000
 _SIDES = 6
 _PER_LOBE = 12  # sides of a lobed trunk for each lobe
+_FROM_THE_SIDES = 0.4  # of the light of the sky
 _LEAST_WIDTH = 0.0004  # of the picture's height
 
 
@@ -65,6 +62,70 @@ class Blades(shapes.Leaves):
 def has_leaves(tree: ParametricTree, season: str) -> bool:
     """Whether the species bears leaves in a season of `SEASONS`."""
     return season != "winter" or tree.parameters.evergreen
+
+
+def colour_of(text: str) -> NDArray[np.float64]:
+    """Read `#rrggbb` as shares of red, green and blue."""
+    return np.array([int(text[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+
+
+def leaf_colour(parameters: Parameters, season: str) -> NDArray[np.float64]:
+    """Colour of the leaves in a season of `SEASONS`, as shares of red, green and blue."""
+    falls = season == "fall" and not parameters.evergreen
+    colour = colour_of(parameters.fall_colour if falls else parameters.leaf_colour)
+    young = 0.0 if parameters.evergreen else SEASONS[season]
+    return np.asarray((1.0 - young) * colour + young * _YOUNG)
+
+
+class TreeScene(Scene):
+    """One parametric tree in its species' colours, with its lobes.
+
+    Parameters
+    ----------
+    tree : ParametricTree
+        The tree.
+    leaves : bool
+        Whether to show leaves, where the season has any.
+    season : str
+        One of `SEASONS`.
+    size : float, optional
+        Height of the picture, m, after which the thinnest twigs are drawn; the tree's unless given.
+    """
+
+    def __init__(
+        self,
+        tree: ParametricTree,
+        *,
+        leaves: bool = True,
+        season: str = "summer",
+        size: float | None = None,
+    ) -> None:
+        box = box_of(tree)
+        least = _LEAST_WIDTH * (size or max(2.0 * box[1, 0], box[1, 2]))
+        super().__init__([tree.skeleton()], leaves=False, least_radius_m=least)
+        self.tree = tree
+        self.bark = colour_of(tree.parameters.bark_colour)
+        wood = replace(self.wood, bark=np.broadcast_to(self.bark, self.wood.bark.shape))
+        self.wood = wood.part(_round(tree)) if is_lobed(tree) else wood
+        if leaves and has_leaves(tree, season) and len(tree.leaves.stem):
+            self.leaves, self.card_scale = _blades(tree, season)
+            area = self.leaves.area * self.card_scale**2
+            self.light = LightVolume(self.leaves.place, area, (self.lower, self.upper))
+            # The sky's light comes from above there; a lone tree has it from the sides too.
+            self.light.sky = _FROM_THE_SIDES + (1.0 - _FROM_THE_SIDES) * self.light.sky
+
+    def add_to(self, plotter: Any) -> None:
+        """Put wood and leaves into a plotter."""
+        super().add_to(plotter)
+        if not is_lobed(self.tree):
+            return
+        mesh = _polygons(*lobed_trunk(self.tree)).compute_normals(
+            cell_normals=False, consistent_normals=False, auto_orient_normals=False
+        )
+        normals = np.asarray(mesh.point_data["Normals"], np.float64)
+        bark = np.broadcast_to(self.bark, normals.shape)
+        mesh["rgb"] = self.lit_bark(np.asarray(mesh.points, np.float64), normals, bark)
+        plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
 
 
 def draw_parametric(
@@ -152,20 +213,10 @@ def _render(
     window: tuple[int, int],
     box: NDArray[np.float64],
 ) -> NDArray[np.uint8]:
-    skeleton = tree.skeleton()
-    reach, top = box[1, 0], box[1, 2]
-    scene = Scene([skeleton], leaves=False, least_radius_m=_LEAST_WIDTH * max(2.0 * reach, top))
-    if leafy and len(tree.leaves.stem):
-        blades, scene.card_scale = _blades(tree, season)
-        scene.leaves = blades
-        bounds = (scene.lower, scene.upper)
-        scene.light = LightVolume(blades.place, blades.area * scene.card_scale**2, bounds)
+    size = max(2.0 * box[1, 0], box[1, 2])
     plotter = open_plotter(window)
     plotter.set_background("white")
-    if is_lobed(tree):
-        scene.wood = scene.wood.part(_beyond_trunk(tree))
-        _add_trunk(plotter, tree, scene.light)
-    scene.add_to(plotter)
+    TreeScene(tree, leaves=leafy, season=season, size=size).add_to(plotter)
     corners = np.array([(x, y, z) for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])
     look_at(plotter, corners, bearing_deg=-75.0, above_deg=4.0, aspect=window[0] / window[1])
     return pixels(plotter)
@@ -179,6 +230,8 @@ def is_lobed(tree: ParametricTree) -> bool:
 def lobed_trunk(tree: ParametricTree) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Give the surface of the trunk and its clones, their radius lobed (section 4.4).
 
+    A plant without leaves, a cactus, has lobes on all stems.
+
     Returns
     -------
     points : float64 (n, 3)
@@ -187,7 +240,7 @@ def lobed_trunk(tree: ParametricTree) -> tuple[NDArray[np.float64], NDArray[np.i
         Their corners.
     """
     stems, nodes = tree.stems, tree.nodes
-    count = int(stems.nodes[stems.level == 0].sum())
+    count = int(stems.nodes[stems.level < _lobed_levels(tree)].sum())
     sides = _PER_LOBE * tree.parameters.lobes
     angle = 2.0 * np.pi * np.arange(sides) / sides
     radius = nodes.radius[:count, None] * lobed(
@@ -206,27 +259,20 @@ def lobed_trunk(tree: ParametricTree) -> tuple[NDArray[np.float64], NDArray[np.i
     return points.reshape(-1, 3), quads.reshape(-1, 4)
 
 
-def _beyond_trunk(tree: ParametricTree) -> NDArray[np.bool_]:
-    """Which internodes of `gather_wood` belong to branches; it leaves out the shortest."""
+def _lobed_levels(tree: ParametricTree) -> int:
+    """Levels of stems with lobes: the trunk's alone; of a plant without leaves, a cactus, all."""
+    return 1 if tree.parameters.leaves else tree.parameters.depth
+
+
+def _round(tree: ParametricTree) -> NDArray[np.bool_]:
+    """Which internodes of `gather_wood` have no lobes; it leaves out the shortest."""
     skeleton = tree.skeleton()
-    return np.asarray(skeleton.order[skeleton.length > 1e-6] > 0)
+    return np.asarray(skeleton.order[skeleton.length > 1e-6] >= _lobed_levels(tree))
 
 
 def _polygons(points: NDArray[np.float64], corners: NDArray[np.int64]) -> Any:
     n, k = corners.shape
     return import_pyvista().PolyData(points, np.column_stack((np.full(n, k), corners)).ravel())
-
-
-def _add_trunk(plotter: Any, tree: ParametricTree, light: LightVolume) -> None:
-    mesh = _polygons(*lobed_trunk(tree)).compute_normals(
-        cell_normals=False, consistent_normals=False, auto_orient_normals=False
-    )
-    normals = np.asarray(mesh.point_data["Normals"], np.float64)
-    sun, sky = light.at(np.asarray(mesh.points, np.float64))
-    bark = np.broadcast_to(look_of(tree.parameters.name).bark, normals.shape)
-    lit = sun * np.maximum(normals @ SUN, 0.0)
-    mesh["rgb"] = shade(bark, lit, 1.3 * sky * (0.75 + 0.25 * normals[:, 2]))
-    plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
 
 
 def write_vtp(
@@ -251,7 +297,7 @@ def write_vtp(
     """
     pv = import_pyvista()
     wood = gather_wood([tree.skeleton()])
-    lines = polylines(wood.part(_beyond_trunk(tree)) if is_lobed(tree) else wood)
+    lines = polylines(wood.part(_round(tree)) if is_lobed(tree) else wood)
     mesh = pv.PolyData()
     mesh.points, mesh.lines = lines.points, lines.cells
     mesh["radius"] = np.maximum(lines.radius, 1e-5)
@@ -293,7 +339,7 @@ def _blades(tree: ParametricTree, season: str) -> tuple[Blades, float]:
     blades = Blades(
         place=some.position.astype(np.float64),
         along=some.direction * some.length[:, None],
-        colour=grain[:, None] * np.asarray(SEASONS[season]),
+        colour=grain[:, None] * leaf_colour(tree.parameters, season),
         needles=np.zeros(len(chosen), np.bool_),
         normal=some.normal.astype(np.float64),
         width=some.width,

@@ -87,10 +87,16 @@ class Scene:
         tubes = mesh.tube(scalars="radius", absolute=True, n_sides=8)
         normals = np.asarray(tubes.point_data["TubeNormals"], np.float64)
         points = np.asarray(tubes.points, np.float64)
+        tubes["rgb"] = self.lit_bark(points, normals, np.asarray(tubes["bark"]))
+        plotter.add_mesh(tubes, scalars="rgb", rgb=True, lighting=False)
+
+    def lit_bark(
+        self, points: NDArray[np.float64], normals: NDArray[np.float64], bark: NDArray[np.float64]
+    ) -> NDArray[np.uint8]:
+        """Colours of bark at points (n, 3) of these normals, lit by sun and sky."""
         sun, sky = self.light.at(points)
         around = 0.75 + 0.25 * normals[:, 2]
-        tubes["rgb"] = shade(np.asarray(tubes["bark"]), sun * _lambert(normals), 1.3 * sky * around)
-        plotter.add_mesh(tubes, scalars="rgb", rgb=True, lighting=False)
+        return shade(bark, sun * _lambert(normals), 1.3 * sky * around)
 
     def _add_twigs(self, plotter: Any, chosen: NDArray[np.int64]) -> None:
         if not len(chosen):

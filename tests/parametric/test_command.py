@@ -116,7 +116,7 @@ def test_species_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         (["lilac", "--to", "lilac.obj"], "unknown format '.obj'"),
         (["lilac", "--seed", "-1"], "seed -1 is not allowed"),
         (["lilac", "--set", "1CurveRes=0"], "level[1].segments: 0 is not allowed"),
-        (["lilac", "--set", "ScaleV=3.5"], "smaller than nothing"),
+        (["lilac", "--set", "ScaleV=4.5"], "smaller than nothing"),
         (["lilac", *_WILD], "more than"),
         (["lilac", "--set", "1Branches=5000", "--set", "2Branches=5000"], "more than"),
         (["lilac", "--quality", "0"], "quality 0 is not allowed"),
