@@ -17,7 +17,8 @@ from forest.view.shapes import gather_leaves, gather_wood, polylines
 _MOST_TUBES = 150_000  # internodes drawn as tubes, the thickest first
 _MOST_TWIGS = 700_000  # internodes drawn as lines
 _MOST_CARDS = 800_000
-_OVERSAMPLING = 2  # pixels are rendered twice as fine and averaged
+#: Pixels are rendered so many times as fine along each side, and averaged.
+OVERSAMPLING = 2
 _HALF_VIEW_DEG = 13.0
 _MARGIN = 1.06
 
@@ -129,7 +130,7 @@ class Scene:
 def open_plotter(window: tuple[int, int], shape: tuple[int, int] = (1, 1)) -> Any:
     """Make an off-screen plotter whose pictures come out `window` pixels wide and high."""
     pv = import_pyvista()
-    size = [side * _OVERSAMPLING for side in window]
+    size = [side * OVERSAMPLING for side in window]
     return pv.Plotter(off_screen=True, window_size=size, shape=shape, border=False)
 
 
@@ -192,7 +193,7 @@ def pixels(plotter: Any) -> NDArray[np.uint8]:
     """Render and average the fine pixels; gives (height, width, 3)."""
     fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
     plotter.close()
-    k = _OVERSAMPLING
+    k = OVERSAMPLING
     height, width = fine.shape[0] // k, fine.shape[1] // k
     mean = fine[: height * k, : width * k, :3].reshape(height, k, width, k, 3).mean(axis=(1, 3))
     return np.asarray(mean.round().astype(np.uint8))
