@@ -90,7 +90,8 @@ def node_at(number: Any, level: Any, tree: Any, shoots: Any, i: Any, z: Any) -> 
     """Node below z on stem i, and how far above it z is, m."""
     total = np.int64(level.segments) * sections_of(level, tree, number)
     along = (z - shoots.start[i] / level.segments) * total
-    k = min(max(np.int64(along), np.int64(0)), np.int64(shoots.nodes[i]) - 2)
+    # What stands at a joint, but for rounding, belongs to the segment above.
+    k = min(max(np.int64(along + 1e-9), np.int64(0)), np.int64(shoots.nodes[i]) - 2)
     return np.int64(shoots.first[i]) + k, (along - k) * shoots.length[i] / total
 
 

@@ -50,7 +50,7 @@ def radius_at(taper: float, radius: float, length: float, z: float) -> float:
     """radius_Z of 4.4, without flare."""
     unit = taper if taper < 1 else max(0.0, 2 - taper)
     pure = radius * (1 - unit * z)
-    if taper < 1:
+    if taper < 1 or pure <= 0:
         return pure
     z2 = (1 - z) * length
     depth = 1.0 if taper < 2 or z2 < pure else taper - 2
@@ -281,7 +281,8 @@ class Tree:
         u, v, w = chance
         fan = (p.leaves if last else level.branches) < 0
         at = 1.0 if fan else z
-        below = max(i for i in range(len(stem.z) - 1) if i == 0 or stem.z[i] <= at + 1e-12)
+        near = at + 1e-9 * (stem.z[1] - stem.z[0])
+        below = max(i for i in range(len(stem.z) - 1) if i == 0 or stem.z[i] <= near)
         f = stem.frame[below]
         place = stem.place[below] + (at - stem.z[below]) * stem.length * f[:, 2]
         ratio = (stem.length * (1 - z)) / (stem.length - base)
