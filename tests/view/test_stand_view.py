@@ -164,6 +164,21 @@ def test_living_trees_of_a_year_stand_at_their_places(run_file: Path) -> None:
     assert bare.notes == built.notes
 
 
+def test_sample_trees_of_a_run_are_spread_like_others(scene: Path, run_file: Path) -> None:
+    with open_run(run_file) as run:
+        sample = run.samples[0]
+        skeleton = run.skeleton(sample, 2008)
+    row = f'run = "{run_file}"\nsample = {sample}\nper'
+    text = SCENE.replace('species = "lilac"\nmost_leaves = 900\nper', row)
+    built = build_scenery(SceneFile.from_toml(text), scene.parent)
+    height = skeleton.end[:, 2].max() - skeleton.start[0, 2]
+    assert built.heights[0] == pytest.approx(height)
+    assert (built.instances.model[:-1] == 0).all()
+    with pytest.raises(InputError, match=r"trees\[0\].run: tree 999 is no sample tree"):
+        wrong = SceneFile.from_toml(text.replace(f"sample = {sample}", "sample = 999"))
+        build_scenery(wrong, scene.parent)
+
+
 def test_without_shapes_parametric_trees_stand_in(tmp_path: Path) -> None:
     from forest.parametric.parameters import parametric_names
     from forest.species import species_names
