@@ -191,7 +191,7 @@ def _stand(
     scales: list[_Array] = []
     if features is not None and scene.trees:
         variants = [
-            np.array(_variants(row, folder, f"{where}: trees[{number}]", stock))
+            np.array(_variants(row, folder, where, f"trees[{number}]", stock))
             for number, row in enumerate(scene.trees)
         ]
         kinds = [
@@ -230,12 +230,12 @@ def _stand(
     )
 
 
-def _variants(row: Trees, folder: Path, where: str, stock: Stock) -> list[int]:
+def _variants(row: Trees, folder: Path, where: str, key: str, stock: Stock) -> list[int]:
     """Make the models of one kind of trees."""
     if row.species is None:
-        with _told(where, "run"):
+        with _told(where, f"{key}.run"):
             return [stock.number((row.run, row.sample, row.year), lambda: _sample(row, folder))]
-    with _told(where, "species"):
+    with _told(where, f"{key}.species"):
         parameters = _parameters(row.species, folder)
     return [
         stock.number(
