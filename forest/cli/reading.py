@@ -195,4 +195,5 @@ def _last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton
     from forest.stand import Stand
 
     stand = Stand.restore(scenario, *found)
-    return stand.year, [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
+    grown = [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
+    return stand.year, grown + [tree.skeleton for tree in stand.residual]

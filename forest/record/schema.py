@@ -50,6 +50,7 @@ DEATH_CAUSES = (
 FELLING_CAUSES = ("thinning", "harvest", "tending")
 ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest")
 STAGES = ("before", "after")
+RESIDUAL_STATUS = ("standing", "felled")
 
 #: What a storm does to a tree.
 STORM_OUTCOMES = ("stood", "broken", "uprooted")
@@ -60,6 +61,9 @@ RING_PLACES = ("height", "crown_base")
 #: Levels of a column of species: the run's own list, without or with the entry for all of them.
 SPECIES = ("<species>",)
 SPECIES_OR_ALL = ("<species>", "all")
+#: Levels of the names of a scenario's residual trees, and of their parametric species.
+RESIDUAL_NAMES = ("<residual tree>",)
+RESIDUAL_SPECIES = ("<parametric species>",)
 
 
 @dataclass(frozen=True)
@@ -95,6 +99,12 @@ class Column:
             return self
         return replace(self, levels=(*species_names, *self.levels[1:]))
 
+    def with_residual(self, names: Sequence[str], species: Sequence[str]) -> Column:
+        """Give the column with the run's own residual trees in place of the placeholders."""
+        if self.levels == RESIDUAL_NAMES:
+            return replace(self, levels=tuple(names))
+        return replace(self, levels=tuple(species)) if self.levels == RESIDUAL_SPECIES else self
+
 
 @dataclass(frozen=True)
 class Table:
@@ -106,6 +116,11 @@ class Table:
     def with_species(self, species_names: Sequence[str]) -> Table:
         """Give the table with the run's own species as levels."""
         columns = tuple(column.with_species(species_names) for column in self.columns)
+        return replace(self, columns=columns)
+
+    def with_residual(self, names: Sequence[str], species: Sequence[str]) -> Table:
+        """Give the table with the run's own residual trees and their species as levels."""
+        columns = tuple(column.with_residual(names, species) for column in self.columns)
         return replace(self, columns=columns)
 
 
@@ -346,6 +361,26 @@ STORMS = Table(
     ),
 )
 
+RESIDUAL = Table(
+    "a residual tree and year in which it stood, and one for the year before whose growth it was "
+    "felled; where the scenario has residual trees",
+    (
+        _YEAR,
+        _count("residual_id", "of the tree in the scenario's list, from 1"),
+        Column("name", "int16", "", "its name", levels=RESIDUAL_NAMES),
+        Column("species", "int16", "", "its parametric species", levels=RESIDUAL_SPECIES),
+        Column("status", "int8", "", "whether it still stood", levels=RESIDUAL_STATUS),
+        Column("x_m", "float32", "m", "place of the stem base"),
+        Column("y_m", "float32", "m", "place of the stem base"),
+        _number("height_m", "m", "height of the highest tip"),
+        _number("dbh_cm", "cm", "stem diameter over bark at 1.3 m"),
+        _number("crown_base_m", "m", "height of the lowest leaf-bearing tip"),
+        _number("crown_radius_m", "m", "mean reach of the crown in eight directions"),
+        _number("leaf_area_m2", "m2", "one-sided area of its leaves"),
+        _number("stem_volume_m3", "m3", "volume of the stem, over bark"),
+    ),
+)
+
 POPULATION = Table(
     "a year: the ledger of the living",
     (
@@ -373,6 +408,7 @@ TABLES: dict[str, Table] = {
     "regeneration": REGENERATION,
     "treatments": TREATMENTS,
     "storms": STORMS,
+    "residual": RESIDUAL,
 }
 
 #: The tables that a run file may hold.
