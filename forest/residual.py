@@ -302,19 +302,12 @@ class ResidualTrees:
 def _standing(tree: ResidualTree, scenario: Scenario, like: str, voxel_m: float) -> Standing:
     """Tell how a tree shades and takes room, by the measure of a species of the scenario."""
     species = scenario.species[like] if like else scenario.species_list[0]
-    architecture, shoots = species.architecture, species.shoots
-    leaves = tree.leaves
+    shape, leaves = tree.skeleton, tree.leaves
     middle = leaves.position + 0.5 * leaves.length[:, None] * leaves.direction
-    shape = tree.skeleton
-    return Standing(
-        StandingLeaves.at(
-            middle, leaves.area, voxel_m, species.leaves.shade_factor / species.leaves.area_m2
-        ),
-        StandingSites.along(
-            shape.start,
-            shape.end,
-            shape.radius,
-            middle,
-            architecture.internode_length_m * shoots.occupancy_radius_internodes,
-        ),
-    )
+    buds_per_m2 = species.leaves.shade_factor / species.leaves.area_m2
+    sites = None
+    if scenario.environment.markers is not None:
+        internodes = species.shoots.occupancy_radius_internodes
+        radius = species.architecture.internode_length_m * internodes
+        sites = StandingSites.along(shape.start, shape.end, shape.radius, middle, radius)
+    return Standing(StandingLeaves.at(middle, leaves.area, voxel_m, buds_per_m2), sites)

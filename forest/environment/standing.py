@@ -163,8 +163,10 @@ class StandingSites(NamedTuple):
         halves = np.rint(wood_radius_m / half).astype(np.int64)
         point = np.concatenate((wood, leaves))
         kind = np.concatenate((halves[of], np.zeros(len(leaves), np.int64)))
-        cell = np.floor(point / half).astype(np.int64)
-        _, first = np.unique(np.column_stack((kind, cell)), axis=0, return_index=True)
+        cell = np.column_stack((kind, np.floor(point / half).astype(np.int64)))
+        cell -= cell.min(axis=0)
+        flat = np.ravel_multi_index(tuple(cell.T), tuple(cell.max(axis=0) + 1))
+        _, first = np.unique(flat, return_index=True)
         first.sort()
         known, index = np.unique(kind[first], return_inverse=True)
         return cls(
@@ -173,25 +175,30 @@ class StandingSites(NamedTuple):
 
 
 class Standing(NamedTuple):
-    """All that stands and does not grow: `leaves` shade, `sites` take markers."""
+    """What stands and does not grow: `leaves` shade, `sites` take markers, where there are any."""
 
     leaves: StandingLeaves
-    sites: StandingSites
+    sites: StandingSites | None
 
 
 def together(parts: Sequence[Standing]) -> Standing | None:
-    """Put several trees together; None if there are none."""
+    """Put several trees together, all with sites or all without; None if there are none."""
     if not parts:
         return None
-    first = np.cumsum([0, *(len(part.sites.radius_m) for part in parts)])
     leaves = StandingLeaves(
         np.concatenate([part.leaves.voxel for part in parts]),
         np.concatenate([part.leaves.area_mm2 for part in parts]),
         np.concatenate([part.leaves.shade for part in parts]),
     )
-    sites = StandingSites(
-        np.concatenate([part.sites.point for part in parts]),
-        np.concatenate([part.sites.kind + k for part, k in zip(parts, first[:-1], strict=True)]),
-        np.concatenate([part.sites.radius_m for part in parts]),
+    sites = [part.sites for part in parts if part.sites is not None]
+    if not sites:
+        return Standing(leaves, None)
+    first = np.cumsum([0, *(len(one.radius_m) for one in sites)])
+    return Standing(
+        leaves,
+        StandingSites(
+            np.concatenate([one.point for one in sites]),
+            np.concatenate([one.kind + k for one, k in zip(sites, first[:-1], strict=True)]),
+            np.concatenate([one.radius_m for one in sites]),
+        ),
     )
-    return Standing(leaves, sites)

@@ -89,9 +89,9 @@ def test_counts_saturate_beside_solids_and_other_trees() -> None:
     """Two trees of too many leaves in one voxel, and a wall: no count runs over."""
     metamers, trees = make_stand(3)
     one = StandingLeaves.at(np.full((5, 3), 0.3), np.full(5, 100.0), VOXEL_M, 400.0)
-    nothing = StandingSites(np.zeros((0, 3)), np.zeros(0, np.int64), np.ones(1))
-    both = together([Standing(one, nothing), Standing(one, nothing)])
+    both = together([Standing(one, None), Standing(one, None)])
     assert both is not None
+    assert both.sites is None
     light = make_light(obstacles=[Box((0.25, 0.25, 0.0), (0.75, 0.5, 0.5))])
     light.expose(metamers, trees, None, both.leaves)
     grid = light._grid
@@ -140,7 +140,14 @@ def test_markers_equal_the_twin(seed: int, periodic: bool, release: bool) -> Non
     markers = [twin.marker_of_cell(seed, *ijk, space.cell_m) for ijk in cells]
     size = SIZE if periodic else None
     taken, won, direction = twin.claim([*buds, *points], markers, rows, size)
-    found = space.claim(metamers, trees, species, standing)
+    bare = StandingLeaves.at(np.zeros((0, 3)), np.zeros(0), VOXEL_M, 40.0)
+    two = [
+        Standing(bare, standing._replace(point=standing.point[k::2], kind=standing.kind[k::2]))
+        for k in range(2)
+    ]
+    both = together(two)
+    assert both is not None
+    found = space.claim(metamers, trees, species, both.sites)
     assert found.found.tolist() == [len(w) for w in won[: len(buds)]]
     np.testing.assert_allclose(
         found.direction, np.array(direction[: len(buds)]).reshape(-1, 3), rtol=1e-5, atol=1e-5
