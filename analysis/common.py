@@ -93,6 +93,15 @@ def save(figure: Figure, to: Path) -> None:
         raise forest.InputError(f"cannot be written: {error.strerror}", where=str(to)) from None
 
 
+def fewer_colours(picture: Path) -> None:
+    """Write a .png again with 256 colours, at a third of its size; for the documentation."""
+    from PIL import Image
+
+    with Image.open(picture) as full:
+        few = full.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    few.save(picture, optimize=True)
+
+
 def panels(columns: int, rows: int = 1, *, size: tuple[float, float] = (4.4, 3.6)) -> Any:
     """Give a figure and its axes, (rows, columns), `size` inches each; lettered a, b, c."""
     figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")

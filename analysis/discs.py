@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT))
 import numpy as np  # noqa: E402
 
 import forest  # noqa: E402
+from analysis.common import fewer_colours  # noqa: E402
 from forest.dendro.disc import Disc  # noqa: E402
 from forest.dendro.life import StemLife  # noqa: E402
 from forest.view.disc_picture import draw_disc, draw_section  # noqa: E402
@@ -58,6 +59,7 @@ def main() -> None:
             discs = [run.disc(i, h) for i in living for h in heights]
             best = max((d for d in discs if len(d.knots) == 1), key=offset)
             draw_disc(best, TO / "disc.png")
+            fewer_colours(TO / "disc.png")
             print(f"tree {best.tree_id} at {best.height_m:g} m: {offset(best):.2f} off centre")
         upright = forest.Scenario.from_toml(STAND % "false")
         with forest.simulate(upright, Path(folder) / "upright.h5") as run:
@@ -66,6 +68,7 @@ def main() -> None:
             middle, normal, _ = fits[straightest]
             board = run.section(straightest, middle, normal)
             draw_section(board, TO / "board.png", widen=8.0, length_m=6.0)
+            fewer_colours(TO / "board.png")
 
 
 if __name__ == "__main__":

@@ -33,7 +33,12 @@ PUBLISHED = {
     "abies_alba": (0.94, 0.72, 0.83),
     "pinus_ponderosa": (0.99, 0.73, 0.84),
 }
-_FEWEST_TREES = 3  # of which the mean over cambial age is drawn
+#: Width below which a ring is hardly found under the microscope.
+HAIRLINE_MM = 0.05
+# Of so many trees, and of half the series, the mean over cambial age is drawn: the last rings are
+# those of the fastest seedlings alone.
+_FEWEST_TREES = 3
+_LAST = 10  # rings
 
 
 def widths_of(run: Run) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -77,8 +82,9 @@ def table(widths: pd.DataFrame, about: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         `species`, `source`, `series`, `mean_mm`, `autocorrelation`, `decline` (share of series
-        with a falling straight line), `missing` (share of rings of width 0) and `interseries`
-        (mean correlation of each series with all others of its species).
+        with a falling straight line), `missing` (share of rings of width 0), `interseries`
+        (mean correlation of each series with all others of its species) and `hairline` (share of
+        the trees whose last ten rings are narrower than 0.05 mm in the mean).
     """
     rows = []
     for species, ids in about.groupby("species").groups.items():
@@ -93,6 +99,7 @@ def table(widths: pd.DataFrame, about: pd.DataFrame) -> pd.DataFrame:
                 "decline": of.apply(declines).mean(),
                 "missing": (of == 0.0).sum().sum() / of.notna().sum().sum(),
                 "interseries": interseries_correlation(of).mean(),
+                "hairline": (of.tail(_LAST).mean() < HAIRLINE_MM).mean(),
             }
         )
     for species, (mean, correlation, share) in PUBLISHED.items():
@@ -119,7 +126,8 @@ def study(run: Run) -> Study:
         left.plot(of.index, of, color=colour, lw=0.4, alpha=0.25)
         left.plot(of.index, of.mean(axis=1), color=colour, lw=1.8)
         aged = by_cambial_age(of)
-        aged = aged[aged.notna().sum(axis=1) >= min(_FEWEST_TREES, len(ids))]
+        fewest = max(min(_FEWEST_TREES, len(ids)), len(ids) / 2)
+        aged = aged[aged.notna().sum(axis=1) >= fewest]
         right.fill_between(
             aged.index, *aged.quantile([0.25, 0.75], axis=1).to_numpy(), color=colour, alpha=0.2,
             lw=0,

@@ -9,6 +9,7 @@ from scipy import stats
 
 from analysis import (
     diameter_distribution,
+    drawn_stems,
     growth_dominance,
     old_growth,
     pressler,
@@ -20,6 +21,7 @@ from analysis import (
 from forest.measure.bucking import Product
 from forest.measure.diameter_target import reverse_j
 from forest.measure.gaps import gap_share
+from forest.measure.products import DEFAULT_PRODUCTS
 from forest.measure.stem import stems_of_skeletons
 from forest.measure.tables import buck_run, plot_of, sample_skeletons
 from forest.measure.taper import RINGS_READ, disc_diameters, taper_stems
@@ -42,6 +44,8 @@ def test_ring_series_by_hand():
     assert row["autocorrelation"] == pytest.approx((1.0 - 1.0) / 2)  # 1 and -1
     assert row["decline"] == 0.5
     assert row["missing"] == pytest.approx(1 / 7)
+    assert row["hairline"] == 0.0
+    assert ring_series.table(widths / 40.0, about).iloc[0]["hairline"] == 0.5
     assert np.isnan(ring_series.autocorrelation(pd.Series([1.0, 1.0, 1.0])))
     aged = ring_series.by_cambial_age(widths)
     assert aged["T2"].tolist()[:3] == [1.0, 0.0, 2.0]
@@ -250,6 +254,34 @@ def test_drawn_stems_of_stand_grown_trees_are_near_the_true_ones(dense_run: Run)
     half = 0.5 * drawn.height_m
     assert drawn.diameter_at(half) == pytest.approx(true.diameter_at(half), rel=0.2)
     assert drawn.volume() == pytest.approx(true.volume(), rel=0.1)
+
+
+def test_drawn_stems_are_held_against_the_true_ones(dense_run: Run):
+    rows, true, drawn = drawn_stems.both_stems(dense_run)
+    assert set(rows["tree_id"]) == set(_living_samples(dense_run))
+    logs = buck_run(dense_run, LAST, DEFAULT_PRODUCTS)
+    sold = logs[logs["stem"] == "exact"].groupby("tree_id")["value"].sum()
+    worth = pd.Series(drawn_stems.worth(true, rows), rows["tree_id"])
+    assert worth[worth > 0.0].to_dict() == pytest.approx(sold.to_dict())
+    excess = drawn_stems.excess_cm(true, drawn)
+    half = 0.5 * min(true.height_m[0], drawn.height_m[0])
+    by_hand = [100.0 * of.diameter_at(half, over_bark=False)[0] for of in (drawn, true)]
+    assert excess[0, 9] == pytest.approx(by_hand[0] - by_hand[1])
+    assert drawn_stems.excess_cm(true, true) == pytest.approx(0.0)
+
+
+def test_drawn_stems_by_hand():
+    rows = pd.DataFrame(
+        {"species": ["a"] * 3, "true": [10.0, 0.0, 30.0], "drawn": [12.0, 0.0, 27.0]}
+    )
+    excess = np.zeros((3, 19))
+    excess[0, 13:] = 3.0  # 0.7 to 0.95 of the height
+    excess[:, :13] = 50.0
+    row = drawn_stems.table(rows, excess).iloc[0]
+    assert row["trees"] == 3
+    assert row["worth_ratio"] == pytest.approx(39.0 / 40.0)
+    assert row["tree_error"] == pytest.approx(0.15)  # of 0.2 and 0.1
+    assert row["upper_excess_cm"] == pytest.approx(1.0)
 
 
 def test_all_trees_of_a_run_are_bucked(dense_run: Run):

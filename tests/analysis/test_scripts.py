@@ -25,6 +25,7 @@ SCRIPTS = {
     "self_thinning": "slope",
     "climate_rings": "driest_year",
     "old_growth": "gap_share",
+    "drawn_stems": "worth_ratio",
 }
 
 
@@ -61,6 +62,7 @@ def test_a_script_starts_as_a_file(dense_run: Run, tmp_path: Path) -> None:
         ("stem_analysis", "has no tree that reaches 1.3 m"),
         ("old_growth", "has no tree of 5 cm"),
         ("growth_dominance", "has no five years that 5 trees lived through"),
+        ("drawn_stems", "has no living sample tree of 1.3 m"),
     ],
 )
 def test_a_stand_of_seedlings_is_refused(
