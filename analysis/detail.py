@@ -34,9 +34,9 @@ planting = { kind = "regular", spacing_m = [6, 6] }
 """
 
 
-def add(plotter: Any, primitives: Primitives) -> None:
-    """Put primitives into a plotter, coloured by what they belong to."""
-    pv, look = import_pyvista(), look_of(SPECIES)
+def add(plotter: Any, primitives: Primitives, colours: Any, **looks: Any) -> None:
+    """Put primitives into a plotter in colours (n, 3), shares of red, green, blue."""
+    pv = import_pyvista()
     n, corners = primitives.vertices.shape[:2]
     if not n:
         return
@@ -44,14 +44,13 @@ def add(plotter: Any, primitives: Primitives) -> None:
     mesh.points = primitives.vertices.reshape(-1, 3)
     cells = np.column_stack((np.full(n, corners), np.arange(n * corners).reshape(n, corners)))
     setattr(mesh, {1: "verts", 2: "lines", 3: "faces"}[corners], cells.ravel())
-    leafy = (primitives.item == LEAF_ITEM)[:, None]
-    mesh.cell_data["rgb"] = (255 * np.where(leafy, look.leaf, look.bark)).astype(np.uint8)
-    shaded = corners == 3
-    plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=shaded, line_width=1, point_size=1.5)
+    mesh.cell_data["rgb"] = (255 * colours).astype(np.uint8)
+    plotter.add_mesh(mesh, scalars="rgb", rgb=True, **looks)
 
 
 def draw(tree: Description, height: float, to: Path) -> None:
     """Draw the tree at all ranges, each magnified to the same size."""
+    look = look_of(SPECIES)
     plotter = import_pyvista().Plotter(
         off_screen=True, shape=(2, len(RANGES_M)), window_size=(1540, 500), border=False
     )
@@ -61,7 +60,10 @@ def draw(tree: Description, height: float, to: Path) -> None:
             plotter.set_background("white")
             shares = fractions(range_m, Sight(season=season), evergreen=False)
             for primitives in tree.drawn(shares):
-                add(plotter, primitives)
+                leafy = (primitives.item == LEAF_ITEM)[:, None]
+                shaded = primitives.vertices.shape[1] == 3
+                looks = {"lighting": shaded, "line_width": 1, "point_size": 1.5}
+                add(plotter, primitives, np.where(leafy, look.leaf, look.bark), **looks)
             middle = np.array([0.0, 0.0, 0.5 * height])
             plotter.camera_position = [middle - np.array([0.0, 60.0, -6.0]), middle, (0, 0, 1)]
             plotter.enable_parallel_projection()

@@ -40,7 +40,8 @@ class ResidualTree:
     name, species : str
         Its name, and that of its parametric species.
     skeleton : Skeleton
-        Its shape in the plot's coordinates; its radius is taken as that over bark.
+        Its shape in the plot's coordinates; its radius is taken as that over bark. Its `tree_id` is
+        below 0, its number with a minus, so that no simulated tree has it.
     leaves : Leaves
         Its leaves, likewise; their areas add up to `leaf_area_m2`.
     height_m : float
@@ -146,7 +147,7 @@ def _base(wanted: Wanted) -> NDArray[np.float64]:
 
 def _placed(form: ParametricTree, wanted: Wanted, factor: float, number: int) -> Skeleton:
     """Scale a tree's shape and put it at its place."""
-    shape = form.skeleton(tree_id=number)
+    shape = form.skeleton(tree_id=-number)
     return replace(
         shape,
         start=_base(wanted) + factor * shape.start,
@@ -303,7 +304,8 @@ def _standing(tree: ResidualTree, scenario: Scenario, like: str, voxel_m: float)
     """Tell how a tree shades and takes room, by the measure of a species of the scenario."""
     species = scenario.species[like] if like else scenario.species_list[0]
     shape, leaves = tree.skeleton, tree.leaves
-    middle = leaves.position + 0.5 * leaves.length[:, None] * leaves.direction
+    blade = leaves.length[:, None] * leaves.direction
+    middle = np.asarray(leaves.position + 0.5 * blade, np.float64)
     buds_per_m2 = species.leaves.shade_factor / species.leaves.area_m2
     sites = None
     if scenario.environment.markers is not None:

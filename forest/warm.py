@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import time
 
-from forest.parametric import grow
+from forest.parametric import ParametricTree, grow
 from forest.scenario import Scenario
 from forest.stand import Stand
+from forest.surface import Camera, Instances, Model, prepare, scene_shadow
+from forest.surface.detail import SEASONS
 
 _YEARS = 3
 _STAND = """
@@ -44,8 +46,20 @@ _VARIANTS = {
 }
 
 
+def _view(tree: ParametricTree) -> None:
+    """Prepare a picture's frame of one tree and the ground beneath it."""
+    grey = (0.5, 0.5, 0.5)
+    foliage = dict.fromkeys(SEASONS, grey)
+    model = Model.of(tree.skeleton(), tree.leaves, evergreen=False, bark=grey, foliage=foliage)
+    one = Instances.of([0], [[0.0, 0.0, 0.0]], [1.0])
+    sun = (0.0, -0.6, 0.8)
+    shadows = scene_shadow([model], one, sun)
+    shadows.shaded([[0.0, 0.0, 0.0]])
+    prepare([model], one, Camera((0, -60, 2), (0, 0, 2)), sun=sun, shadows=shadows)
+
+
 def main() -> None:
-    """Grow the tiny stands and a shrub, and say how long each took."""
+    """Grow the tiny stands and a shrub, look at it, and say how long each took."""
     stand = Scenario.from_toml(_STAND, where="forest.warm")
     for name, changes in _VARIANTS.items():
         start = time.perf_counter()
@@ -55,8 +69,10 @@ def main() -> None:
             grown.step()
         print(f"{time.perf_counter() - start:.1f} s", flush=True)
     start = time.perf_counter()
-    print("kernels: parametric trees ... ", end="", flush=True)
-    grow("lilac").swayed(1.0, 1.0)
+    print("kernels: parametric trees, views ... ", end="", flush=True)
+    tree = grow("lilac")
+    tree.swayed(1.0, 1.0)
+    _view(tree)
     print(f"{time.perf_counter() - start:.1f} s", flush=True)
 
 

@@ -3,8 +3,8 @@
 `{scenario-keys}` and `{species-keys}` list every key with unit, default, range and meaning;
 `{species-values}` sets the shipped species side by side, `{species-sources}` says where the values
 come from. `{run-file-columns}` lists the tables of the run file, `{interop-columns}` what they give
-to other programs, `{parametric-keys}` the parameters of parametric trees. `{pictures}` shows the
-gallery.
+to other programs, `{parametric-keys}` the parameters of parametric trees, `{scene-keys}` those
+of a scene. `{pictures}` shows the gallery.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from forest.record.schema import columns_markdown
 from forest.scenario import Scenario
 from forest.species import Species, describe, load_species, species_names
 from forest.species.parametric import PAPER_LEVEL_NAMES, PAPER_NAMES, Parameters
+from forest.view.scenery.file import SceneFile
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -136,7 +137,7 @@ def _short(value: Any) -> str:
 def _directive(text: Any) -> type[SphinxDirective]:
     class Generated(SphinxDirective):
         def run(self) -> list[nodes.Node]:
-            for room in ("scenario", "species", "record", "interop", "parametric"):
+            for room in ("scenario", "species", "record", "interop", "parametric", "view/scenery"):
                 for source in (Path(forest.__file__).parent / room).glob("*.*"):
                     self.env.note_dependency(str(source))
             self.env.note_dependency(str(Path(__file__).parents[1] / "gallery" / "captions.toml"))
@@ -159,5 +160,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("run-file-columns", _directive(columns_markdown))
     app.add_directive("interop-columns", _directive(mapping_markdown))
     app.add_directive("parametric-keys", _directive(parametric_keys))
+    app.add_directive("scene-keys", _directive(lambda: keys_by_table(SceneFile)))
     app.add_directive("pictures", _directive(pictures))
     return {"parallel_read_safe": True}

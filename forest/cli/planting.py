@@ -15,7 +15,7 @@ def tree(
         str | None, typer.Argument(help="A parametric species, or a TOML file of one.")
     ] = None,
     to: Annotated[
-        Path | None, typer.Option("--to", help="A .vtp, .csv (cylinders) or .png file.")
+        Path | None, typer.Option("--to", help="A .vtp, .csv (cylinders), .png or .gif file.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Each seed is another tree.")] = 0,
     changes: Overrides = None,
@@ -24,6 +24,13 @@ def tree(
     time: Annotated[float, typer.Option(help="Moment of the wind, s.")] = 0.0,
     wind: Annotated[float, typer.Option(help="Wind speed, as in the paper.")] = 0.0,
     gust: Annotated[float, typer.Option(help="Gusts above the wind speed.")] = 0.0,
+    time_scale: Annotated[
+        float | None,
+        typer.Option(help="How much faster than printed it swings; of itself 1, in a .gif 2000."),
+    ] = None,
+    frames: Annotated[int, typer.Option(help="Pictures of a .gif.", min=2, max=1000)] = 24,
+    seconds: Annotated[float, typer.Option(help="How long a .gif runs.", min=0.1)] = 4.0,
+    quality: Annotated[float, typer.Option(help="Factor on the number of leaves.")] = 1.0,
     readings: Annotated[str, typer.Option(help="corrected or paper.")] = "corrected",
     list_: Annotated[bool, typer.Option("--list", help="List the species.")] = False,
     force: Annotated[bool, typer.Option(help="Replace the file.")] = False,
@@ -37,6 +44,8 @@ def tree(
         forest tree quaking_aspen --seed 3 --to aspen.png
 
         forest tree quaking_aspen --set 1Branches=30 --wind 8 --time 2 --to aspen.vtp
+
+        forest tree quaking_aspen --wind 8 --frames 24 --seconds 4 --to sway.gif
     """
     from forest.errors import InputError, nearest
     from forest.parametric import grow, load_parameters, parametric_names
@@ -46,13 +55,19 @@ def tree(
             typer.echo(f"{name:<22} {load_parameters(name).common_name}")
         return
     if to is not None:
-        check_targets((to, (".vtp", ".csv", ".png")), force=force)
+        check_targets((to, (".vtp", ".csv", ".png", ".gif")), force=force)
     seasons = ("spring", "summer", "fall", "winter")
     if season not in seasons:
         raise InputError(f"unknown season '{season}', {nearest(season, seasons)}")
     parameters = load_parameters(species).with_changes(changes or [])
-    one = grow(parameters, seed, readings=readings)  # type: ignore[arg-type]
-    one = one.swayed(time, wind, gust)
+    moving = to is not None and to.suffix.lower() == ".gif"
+    if moving and wind == 0.0 and gust == 0.0:
+        raise InputError("nothing moves in a .gif", expected="--wind or --gust above 0")
+    still = grow(parameters, seed, readings=readings, quality=quality)  # type: ignore[arg-type]
+    scale = time_scale if time_scale is not None else 2000.0 if moving else 1.0
+    times = [time + k * seconds / frames for k in range(frames if moving else 1)]
+    moments = list(still.frames(times, wind, gust, time_scale=scale))
+    one = moments[0]
     typer.echo(
         f"{parameters.name}, seed {seed}: {one.nodes.position[:, 2].max():.1f} m, "
         f"{len(one.stems.level)} stems, {len(one.leaves.stem)} leaves"
@@ -64,9 +79,11 @@ def tree(
 
         write_simpleforest(one.skeleton(), to, overwrite=force)
         return
-    from forest.view.parametric_picture import draw_parametric, has_leaves, write_vtp
+    from forest.view.parametric_picture import draw_parametric, draw_sway, has_leaves, write_vtp
 
     if to.suffix.lower() == ".vtp":
         write_vtp(one, to, leaves=leaves and has_leaves(one, season), overwrite=force)
+    elif moving:
+        draw_sway(moments, to, seconds=seconds, leaves=leaves, season=season, overwrite=force)
     else:
         draw_parametric(one, to, leaves=leaves, season=season)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,13 +13,10 @@ from forest.cli.shared import (
     RunFile,
     check_picture,
     check_targets,
+    last_shapes,
     print_pairs,
     print_stand_table,
 )
-
-if TYPE_CHECKING:
-    from forest.scenario import Scenario
-    from forest.trees.skeleton import Skeleton
 
 
 def table(run_file: RunFile) -> None:
@@ -175,25 +172,6 @@ def picture(
         if to is not None:
             from forest.view.stand_picture import draw_stand
 
-            year, skeletons = _last_shapes(run_file, run.scenario)
+            year, skeletons = last_shapes(run_file, run.scenario)
             draw_stand(skeletons, run.scenario.plot.size_m, to)
             typer.echo(f"{to}: {len(skeletons)} trees in {year}")
-
-
-def _last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]]:
-    """Bring back all trees as they were at the last checkpoint: calendar year and shapes."""
-    from forest.errors import InputError
-    from forest.record.checkpoint import latest_checkpoint
-
-    found = latest_checkpoint(run_file)
-    if found is None:
-        raise InputError(
-            "has no checkpoint beside it, and only checkpoints hold the shapes of all trees",
-            where=str(run_file),
-            expected=f"{run_file.name}.checkpoint-*.npz in the same folder",
-        )
-    from forest.stand import Stand
-
-    stand = Stand.restore(scenario, *found)
-    grown = [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
-    return stand.year, grown + [tree.skeleton for tree in stand.residual]

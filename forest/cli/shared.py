@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from forest.scenario import Scenario
+    from forest.trees.skeleton import Skeleton
 
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="The scenario.")]
 RunFile = Annotated[Path, typer.Argument(metavar="RUN.h5", help="A run file, finished or not.")]
@@ -71,3 +75,25 @@ def check_targets(*targets: tuple[Path | None, tuple[str, ...]], force: bool) ->
         if path.resolve() in seen:
             raise InputError("is asked for twice", where=str(path), expected="a path for each")
         seen.add(path.resolve())
+
+
+def last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]]:
+    """Bring back all trees as they were at the last checkpoint: calendar year and shapes.
+
+    Residual trees that stand come last, with numbers below 0.
+    """
+    from forest.errors import InputError
+    from forest.record.checkpoint import latest_checkpoint
+
+    found = latest_checkpoint(run_file)
+    if found is None:
+        raise InputError(
+            "has no checkpoint beside it, and only checkpoints hold the shapes of all trees",
+            where=str(run_file),
+            expected=f"{run_file.name}.checkpoint-*.npz in the same folder",
+        )
+    from forest.stand import Stand
+
+    stand = Stand.restore(scenario, *found)
+    grown = [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
+    return stand.year, grown + [tree.skeleton for tree in stand.residual]

@@ -54,6 +54,13 @@ def turn_about(f: Any, u: Any, v: Any, w: Any, angle: Any, size: Any) -> None:
 
 
 @njit
+def copy(to: Any, source: Any) -> None:
+    """Set `to` to `source`, number by number: an assignment of slices would make an array."""
+    for k in range(len(to)):
+        to[k] = source[k]
+
+
+@njit
 def load_frame(f: Any, side: Any, heading: Any, row: Any) -> None:
     """Set f from a side (its x) and a heading (its z); y is z cross x."""
     for k in range(3):

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from forest._threads import in_threads
 from forest.errors import InputError
+from forest.parametric.alone import grow_alone, probe_alone, scratch
 from forest.parametric.bearing import bear_leaves, count_children, spring
 from forest.parametric.stems import (
     OF_SELF,
+    Hand,
     Origins,
     Pending,
     Sections,
@@ -20,6 +22,7 @@ from forest.parametric.stems import (
     Whole,
     draw,
     grow_level,
+    sections_of,
 )
 from forest.parametric.tree import Joints, Nodes, ParametricTree, Stems
 from forest.species.parametric import Parameters, load_parameters, pack
@@ -32,6 +35,9 @@ _SMALLEST = 0.1  # of Scale: a tree drawn smaller is drawn again
 _TRUNK_KEY = 1
 
 Readings = Literal["corrected", "paper"]
+
+#: How a driver's chunks are run: in all threads, or in this one.
+_Run = Callable[..., None]
 
 
 def grow(
@@ -64,6 +70,12 @@ def grow(
         If the species or seed is not right, or the tree would have more than `MOST_STEMS` stems,
         `MOST_NODES` cross sections or `MOST_LEAVES` leaves.
     """
+    return _grow(parameters, seed, readings, quality, in_threads)
+
+
+def _grow(
+    parameters: Parameters | str | Path, seed: int, readings: str, quality: float, run: _Run
+) -> ParametricTree:
     if not isinstance(parameters, Parameters):
         parameters = load_parameters(parameters)
     if not 0 <= seed < 2**64:
@@ -80,22 +92,22 @@ def grow(
     factor = parameters.trunk_scale + (2.0 * u[0] - 1.0) * parameters.trunk_scale_variation
     whole = Whole(own, scale, factor, printed)
     origins = _trunk(parameters, scale, factor if printed else 1.0, u[1])
-    grown: list[tuple[Shoots, Sections]] = []
-    stems = nodes = 0
-    number = 0
-    while len(origins.key):
-        shoots, sections = _level(number, tree, levels, whole, origins, (stems, nodes))
-        grown.append((shoots, sections))
-        if number + 1 == parameters.depth:
+    grown = Grown([], [])
+    while True:
+        number, before = len(grown.levels), grown.size()
+        grown.add(before, *_level(number, tree, levels, whole, origins, before, run))
+        if number + 1 == parameters.depth or not len(grown.levels[-1][0].key):
             break
-        most = float(levels[number + 1]["branches"])
-        count = count_children(number, tree, levels, scale, most, False, shoots)
+        shoots, sections = grown.levels[-1]
+        rows = np.empty(len(shoots.key), np.int64)
+        most = abs(float(levels[number + 1]["branches"]))
+        count = count_children(number, tree, levels, scale, most, False, shoots, rows)
         _refuse(count, MOST_STEMS, "stems", number + 1)
+        if not count:
+            break
         origins = _origins(count)
-        spring(number, tree, levels, whole, shoots, sections, (stems, nodes), origins)
-        stems, nodes = stems + len(shoots.key), nodes + len(sections.z)
-        number += 1
-    leaves, leaf_node = _bear(parameters, quality, tree, levels, whole, grown)
+        run(spring, number, tree, levels, whole, shoots, sections, before, rows, origins, scratch())
+    leaves, leaf_node = _bear(parameters, quality, tree, levels, whole, grown, run)
     return _assemble(parameters, seed, scale, grown, leaves, leaf_node, u[2])
 
 
@@ -109,10 +121,14 @@ def grow_many(
 
     def work(first: int, step: int) -> None:
         for k in range(first, len(seeds), step):
-            trees[k] = grow(parameters, seeds[k], readings=readings)
+            trees[k] = _grow(parameters, seeds[k], readings, 1.0, _in_this_thread)
 
     in_threads(work)
     return trees
+
+
+def _in_this_thread(kernel: Callable[..., object], *args: object) -> None:
+    kernel(0, 1, *args)
 
 
 def _draw_scale(parameters: Parameters, seed: Any) -> float:
@@ -156,40 +172,113 @@ def _trunk(parameters: Parameters, scale: float, factor: float, u: float) -> Ori
     return origins
 
 
+class Grown(NamedTuple):
+    """The levels so far, each a view of the end of arrays with room for those below it."""
+
+    levels: list[tuple[Shoots, Sections]]
+    rooms: list[tuple[Shoots, Sections]]
+
+    def size(self) -> tuple[int, int]:
+        """Count the stems and nodes of all levels."""
+        return sum(len(s.key) for s, _ in self.levels), sum(len(c.z) for _, c in self.levels)
+
+    def add(self, before: tuple[int, int], shoots: Shoots, sections: Sections) -> None:
+        """Take the arrays of the next level; their first `before` rows are room."""
+        self.rooms.append((shoots, sections))
+        self.levels.append(
+            (
+                Shoots(*(a[before[0] :] for a in shoots)),
+                Sections(*(a[before[1] :] for a in sections)),
+            )
+        )
+
+    def whole(self) -> tuple[Shoots, Sections]:
+        """Put all levels one after the other; the last, by far the largest, stays where it is."""
+        shoots, sections = self.rooms[-1]
+        n = m = 0
+        for own_shoots, own_sections in self.levels[:-1]:
+            for to, column in zip(shoots, own_shoots, strict=True):
+                to[n : n + len(column)] = column
+            for to, column in zip(sections, own_sections, strict=True):
+                to[m : m + len(column)] = column
+            n, m = n + len(own_shoots.key), m + len(own_sections.z)
+        return shoots, sections
+
+
 def _level(
-    number: int, tree: Any, levels: Any, whole: Whole, origins: Origins, before: tuple[int, int]
+    number: int,
+    tree: Any,
+    levels: Any,
+    whole: Whole,
+    origins: Origins,
+    before: tuple[int, int],
+    run: _Run,
 ) -> tuple[Shoots, Sections]:
-    """Grow a level in arrays that double until it fits."""
+    """Grow a level behind `before` rows of room, in arrays that double until it fits."""
     level = levels[number]
     res = int(level["segments"])
-    wanted = 32 if level["taper"] > 2.0 or (number == 0 and tree[0]["flare"] > 0.0) else 8
-    per = -(-(wanted if wanted == 32 or level["taper"] > 1.0 else 1) // res)
+    per = int(sections_of(level, tree[0], number))
     splits = level["splits"] + (tree[0]["base_splits"] if number == 0 else 0)
     n = len(origins.key) + (16 + len(origins.key) if splits > 0 else 0)
     while True:
-        m = n * (res * per + 1) + 1
-        shoots = Shoots(
-            np.empty(n, np.int32), np.empty(n, np.bool_), np.empty(n), np.empty(n),
-            np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n), np.empty(n, np.int32),
-            np.empty(n, np.uint64), np.empty(n, np.int32), np.empty(n), np.empty(n),
-        )  # fmt: skip
-        sections = Sections(
-            np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3)), np.empty(m),
-            np.empty(m, np.int32), np.empty(m),
-        )  # fmt: skip
-        pending = Pending(
-            np.empty((n, 12)), np.empty((n, 6)), np.empty((n, 3), np.int32), np.empty(n, np.uint64)
+        m = n * (res * per + 1)
+        shoots, sections, pending = _space(before, n, m)
+        own = (
+            Shoots(*(a[before[0] :] for a in shoots)),
+            Sections(*(a[before[1] :] for a in sections)),
+            pending,
         )
-        stems, nodes = grow_level(
-            number, tree, levels, whole, origins, before, shoots, sections, pending
-        )
+        if splits > 0:
+            hand = Hand(False, *own, np.empty(12), np.empty(6))
+            stems, nodes = grow_level(number, tree, levels, whole, origins, before, hand)
+        else:
+            stems = _alone(run, number, tree, levels, whole, origins, before, own)
+            nodes = stems * (res * per + 1)
         if stems >= 0:
             break
         n *= 2
         _refuse(before[0] + n, MOST_STEMS, "stems", number)
         _refuse(before[1] + n * (res * per + 1), 4 * MOST_NODES, "cross sections", number)
     _refuse(before[1] + nodes, MOST_NODES, "cross sections", number)
+    stems, nodes = before[0] + stems, before[1] + nodes
     return Shoots(*(a[:stems] for a in shoots)), Sections(*(a[:nodes] for a in sections))
+
+
+def _alone(
+    run: _Run,
+    number: int,
+    tree: Any,
+    levels: Any,
+    whole: Whole,
+    origins: Origins,
+    before: tuple[int, int],
+    own: tuple[Any, ...],
+) -> int:
+    """Grow a level without splits; gives the number of stems."""
+    length, own = np.empty(len(origins.key)), (*own, scratch())
+    run(probe_alone, number, tree, levels, whole, origins, before, own, length)
+    kept = length > 0.0
+    row: Any = np.cumsum(kept) - kept
+    run(grow_alone, number, tree, levels, whole, origins, before, own, length, row)
+    return int(kept.sum())
+
+
+def _space(before: tuple[int, int], n: int, m: int) -> tuple[Shoots, Sections, Pending]:
+    """Make arrays for n stems and m nodes, with room before them."""
+    pending = Pending(
+        np.empty((n, 12)), np.empty((n, 6)), np.empty((n, 3), np.int32), np.empty(n, np.uint64)
+    )
+    n, m = n + before[0], m + before[1]
+    shoots = Shoots(
+        np.empty(n, np.int32), np.empty(n, np.bool_), np.empty(n), np.empty(n),
+        np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n), np.empty(n, np.int32),
+        np.empty(n, np.uint64), np.empty(n, np.int32), np.empty(n), np.empty(n),
+    )  # fmt: skip
+    sections = Sections(
+        np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3)), np.empty(m),
+        np.empty(m, np.int32), np.empty(m),
+    )  # fmt: skip
+    return shoots, sections, pending
 
 
 def _refuse(count: int, most: int, what: str, number: int) -> None:
@@ -206,46 +295,64 @@ def _bear(
     tree: Any,
     levels: Any,
     whole: Whole,
-    grown: list[tuple[Shoots, Sections]],
+    grown: Grown,
+    run: _Run,
 ) -> tuple[Leaves, Any]:
     """Put leaves on the stems of the last level; a tree that lacks it has none."""
     number = parameters.depth - 1
     most = abs(parameters.leaves) * quality
     n = 0
-    if len(grown) == parameters.depth and most > 0.0:
-        shoots, sections = grown[-1]
-        n = count_children(number, tree, levels, whole.scale, most, True, shoots)
+    if len(grown.levels) == parameters.depth and most > 0.0:
+        shoots, sections = grown.levels[-1]
+        rows = np.empty(len(shoots.key), np.int64)
+        n = count_children(number, tree, levels, whole.scale, most, True, shoots, rows)
         _refuse(n, MOST_LEAVES, "leaves", number + 1)
-    out = (np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)))
-    out_of = (np.empty(n, np.int32), np.empty(n, np.int32))
+    stem, node = np.empty(n, np.int32), np.empty(n, np.int32)
+    place = [np.empty((n, 3), np.float32) for _ in range(3)]
     if n:
-        below = (sum(len(s.key) for s, _ in grown[:-1]), sum(len(c.z) for _, c in grown[:-1]))
-        bear_leaves(number, tree, levels, whole, shoots, sections, below, most, (*out, *out_of))
+        total = grown.size()
+        below = (total[0] - len(shoots.key), total[1] - len(sections.z))
+        out = (*place, stem, node)
+        run(
+            bear_leaves,
+            number,
+            tree,
+            levels,
+            whole,
+            shoots,
+            sections,
+            below,
+            most,
+            rows,
+            out,
+            scratch(),
+        )
     length = parameters.leaf_scale / np.sqrt(quality)
     leaves = Leaves(
-        *out,
-        np.full(n, length),
-        np.full(n, length * parameters.leaf_scale_x),
-        np.full(n, parameters.leaf_shape, np.int8),
-        out_of[0],
+        place[0],
+        place[1],
+        place[2],
+        np.broadcast_to(length, n),
+        np.broadcast_to(length * parameters.leaf_scale_x, n),
+        np.broadcast_to(np.int8(parameters.leaf_shape), n),
+        stem,
     )
-    return leaves, out_of[1]
+    return leaves, node
 
 
 def _assemble(
     parameters: Parameters,
     seed: int,
     scale: float,
-    grown: list[tuple[Shoots, Sections]],
+    grown: Grown,
     leaves: Leaves,
     leaf_node: Any,
     u: float,
 ) -> ParametricTree:
-    shoots = Shoots(*(np.concatenate(c) for c in zip(*(s for s, _ in grown), strict=True)))
-    sections = Sections(*(np.concatenate(c) for c in zip(*(c for _, c in grown), strict=True)))
-    stems = [len(s.key) for s, _ in grown]
-    nodes_before = np.cumsum([0, *(len(c.z) for _, c in grown)])[:-1]
-    segments = [parameters.of_level(k).segments for k in range(len(grown))]
+    shoots, sections = grown.whole()
+    stems = [len(s.key) for s, _ in grown.levels]
+    nodes_before = np.cumsum([0, *(len(c.z) for _, c in grown.levels)], dtype=np.int32)[:-1]
+    segments = [parameters.of_level(k).segments for k in range(len(stems))]
     stretch = parameters.z_scale + (2.0 * u - 1.0) * parameters.z_scale_variation
     if stretch != 1.0:
         sections, leaves = _stretched(sections, leaves, stretch)
@@ -254,12 +361,12 @@ def _assemble(
         seed=seed,
         scale=scale,
         stems=Stems(
-            np.repeat(np.arange(len(grown), dtype=np.int32), stems),
+            np.repeat(np.arange(len(stems), dtype=np.int32), stems),
             shoots.parent,
             shoots.clone,
             shoots.length,
             shoots.radius,
-            (shoots.first + np.repeat(nodes_before, stems)).astype(np.int32),
+            shoots.first + np.repeat(nodes_before, stems),
             shoots.nodes,
             shoots.offset,
         ),
@@ -283,4 +390,4 @@ def _stretched(sections: Sections, leaves: Leaves, factor: float) -> tuple[Secti
     side = sections.side - heading * np.sum(sections.side * heading, axis=1, keepdims=True)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     sections = sections._replace(position=sections.position * along, heading=heading, side=side)
-    return sections, leaves._replace(position=leaves.position * along)
+    return sections, leaves._replace(position=leaves.position * along.astype(np.float32))

@@ -1,7 +1,9 @@
 """The stems of one level, with their clones (Weber & Penn 1995, 4.1, 4.2, 4.4, 4.6, 4.8).
 
 A *family* is a stem and all clones that split off it. A family is grown at a length; where the
-envelope prunes, it is grown over and over at nine tenths of the length until it fits.
+envelope prunes, it is probed over and over at nine tenths of the length until it fits. What is
+handed many arrays is compiled as a `driver`, since counting references to them took most of the
+time.
 """
 
 from __future__ import annotations
@@ -10,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from forest._jit import njit
-from forest.parametric.frames import declination, load_frame, turn_about, turn_x, turn_z
+from forest._jit import driver, njit
+from forest.parametric.frames import copy, declination, load_frame, turn_about, turn_x, turn_z
 from forest.parametric.ratios import flared, shape_ratio, tapered
 from forest.random import STREAM_PARAMETRIC, philox, uniforms
 
@@ -82,6 +84,17 @@ class Pending(NamedTuple):
     state: Any  # float64 (n, 6): place, compensation now, more of it later, propensity
     at: Any  # int32 (n, 3): segment, parent stem, parent node
     key: Any  # uint64 (n,)
+
+
+class Hand(NamedTuple):
+    """What a family is grown with: where it is written, and scratch of one thread."""
+
+    probing: Any  # bool: only the positions are wanted
+    shoots: Shoots
+    sections: Sections
+    pending: Pending
+    frame: Any  # float64 (12,)
+    state: Any  # float64 (6,)
 
 
 class Whole(NamedTuple):
@@ -178,7 +191,7 @@ def spread(f: Any, u: Any, down: Any, factor: Any) -> None:
     turn_about(f, 0.0, 0.0, 1.0, factor * angle * _DEGREE, np.int64(12))
 
 
-@njit
+@driver
 def place_clones(
     n: Any, f: Any, p: Any, level: Any, whole: Any, s: Any, here: Any, pending: Any, waiting: Any
 ) -> Any:
@@ -196,11 +209,11 @@ def place_clones(
         own = descend(whole.seed, key, OF_CLONE + 1_000 * k + s)
         u, v, _, _ = draw(whole.seed, own, OF_SELF)
         clone = pending.frame[row]
-        clone[:] = f
+        copy(clone, f)
         angle = lean(clone, level, u, down)
         if k > 1:
             spread(clone, v, down, sign * ((k + 1) // 2 if k % 2 else -(k // 2)))
-        pending.state[row] = p
+        copy(pending.state[row], p)
         pending.state[row, 4] = p[4] + angle / left
         pending.at[row, 0] = s
         pending.at[row, 1] = stem
@@ -222,7 +235,7 @@ def sections_of(level: Any, tree: Any, number: Any) -> Any:
     return np.int64(np.ceil(wanted / level.segments))
 
 
-@njit
+@driver
 def section_radius(
     level: Any, tree: Any, whole: Any, number: Any, radius: Any, z: Any, le: Any
 ) -> Any:
@@ -231,7 +244,22 @@ def section_radius(
     return r * flared(tree.flare, z) * whole.trunk_factor if number == 0 else r
 
 
-@njit
+@driver
+def base_radius(tree: Any, origins: Any, o: Any, length: Any) -> Any:
+    """Radius at the base of a family's course, m (4.4)."""
+    relative = length / origins.parent_length[o]
+    return min(origins.parent_radius[o] * relative**tree.ratio_power, origins.limit[o])
+
+
+@driver
+def set_frame(sections: Any, m: Any, f: Any) -> None:
+    """Write a section's frame, number by number: an assignment of slices would allocate."""
+    for c in range(3):
+        sections.heading[m, c] = f[6 + c]
+        sections.side[m, c] = f[c]
+
+
+@driver
 def grow_family(
     number: Any,
     level: Any,
@@ -242,26 +270,19 @@ def grow_family(
     length: Any,
     error: Any,
     base: Any,
-    shoots: Any,
-    sections: Any,
-    pending: Any,
+    hand: Any,
 ) -> Any:
-    """Grow a stem and its clones at a length.
+    """Grow a stem and its clones at a length, or probe it.
 
     `base` = (stems, nodes before this level, stems, nodes of this level so far). Returns
-    (error of the splits, stems, nodes, whether all lies in the envelope); -1 stems: no room.
+    (error of the splits, stems, nodes); -1 stems: no room.
     """
     stems_before, nodes_before, n, m = base
+    probing, shoots, sections, pending, f, p = hand
     res = np.int64(level.segments)
     per = sections_of(level, tree, number)
     step = length / (res * per)
-    longest = origins.longest[o]
-    share = length / longest if longest > 0.0 else 1.0
-    relative = length / origins.parent_length[o]
-    radius = min(origins.parent_radius[o] * relative**tree.ratio_power, origins.limit[o])
-    reach = origins.offset[o] / origins.parent_length[o]
-    fits = True
-    f, p = np.empty(12), np.empty(6)
+    radius = 0.0 if probing else base_radius(tree, origins, o, length)
     pending.at[0, 0] = 0
     waiting: Any = 1
     while waiting > 0:
@@ -269,26 +290,29 @@ def grow_family(
         start = np.int64(pending.at[waiting, 0])
         if start == 0:
             load_frame(f, origins.side, origins.heading, o)
-            f[9:12] = f[6:9]
-            p[:3] = origins.position[o]
-            p[3:] = 0.0
+            copy(f[9:12], f[6:9])
+            copy(p[:3], origins.position[o])
+            p[3] = p[4] = 0.0
             p[5] = 1.0
             key = origins.key[o]
-            shoots.parent[n], shoots.node[n] = origins.parent[o], origins.node[o]
-            shoots.offset[n] = origins.offset[o]
+            parent, node, offset = origins.parent[o], origins.node[o], origins.offset[o]
             if level.curve_variation < 0.0:
                 turn_x(f, -level.curve_variation * _DEGREE)
         else:
-            f[:] = pending.frame[waiting]
-            p[:] = pending.state[waiting]
+            copy(f, pending.frame[waiting])
+            copy(p, pending.state[waiting])
             key = pending.key[waiting]
-            shoots.parent[n], shoots.node[n] = pending.at[waiting, 1], pending.at[waiting, 2]
-            shoots.offset[n] = length * start / res
-        shoots.clone[n] = start > 0
-        shoots.length[n], shoots.radius[n] = length, radius
-        shoots.first[n], shoots.nodes[n] = m, (res - start) * per + 1
-        shoots.key[n], shoots.start[n] = key, start
-        shoots.share[n], shoots.reach[n] = share, reach
+            parent, node = pending.at[waiting, 1], pending.at[waiting, 2]
+            offset = length * start / res
+        if not probing:
+            longest = origins.longest[o]
+            shoots.parent[n], shoots.node[n], shoots.offset[n] = parent, node, offset
+            shoots.clone[n] = start > 0
+            shoots.length[n], shoots.radius[n] = length, radius
+            shoots.first[n], shoots.nodes[n] = m, (res - start) * per + 1
+            shoots.key[n], shoots.start[n] = key, start
+            shoots.share[n] = length / longest if longest > 0.0 else 1.0
+            shoots.reach[n] = origins.offset[o] / origins.parent_length[o]
         before = waiting
         for s in range(start, res):
             more = 0.0
@@ -301,9 +325,9 @@ def grow_family(
                     error += splits - clones
                 room = min(len(pending.key), len(shoots.key) - n - 1)
                 if waiting + clones > room:
-                    return error, np.int64(-1), m, fits
+                    return error, np.int64(-1), m
                 if clones > 0:
-                    p[5] *= tree.clone_habit
+                    p[5] = tree.clone_habit if whole.printed else p[5] * tree.clone_habit
                     here = (stems_before + n, nodes_before + m - 1, key)
                     more = place_clones(clones, f, p, level, whole, s, here, pending, waiting)
                     waiting += clones
@@ -314,30 +338,28 @@ def grow_family(
                 p[4] = 0.0
                 if number > 1:
                     attract(f, level, tree)
-            if m + per + 1 >= len(sections.z):
-                return error, np.int64(-1), m, fits
+            if m + per + (1 if s == start else 0) > len(sections.z):
+                return error, np.int64(-1), m
             for k in range(0 if s == start else 1, per + 1):
-                if s > start and k == 1:
-                    sections.heading[m - 1], sections.side[m - 1] = f[6:9], f[0:3]
                 if k > 0:
                     for c in range(3):
                         p[c] += step * f[6 + c]
-                    fits &= inside(tree, whole, p[0], p[1], p[2])
-                for c in range(3):  # an assignment of slices would allocate
-                    sections.position[m, c] = p[c]
-                    sections.heading[m, c] = f[6 + c]
-                    sections.side[m, c] = f[c]
-                z = (s * per + k) / (res * per)
-                sections.z[m] = z
-                sections.radius[m] = section_radius(level, tree, whole, number, radius, z, length)
-                sections.stem[m] = stems_before + n
+                copy(sections.position[m], p)
+                if not probing:
+                    if s > start and k == 1:  # the section at the joint turns with what it bears
+                        set_frame(sections, m - 1, f)
+                    set_frame(sections, m, f)
+                    z = (s * per + k) / (res * per)
+                    le = length
+                    sections.radius[m] = section_radius(level, tree, whole, number, radius, z, le)
+                    sections.z[m], sections.stem[m] = z, stems_before + n
                 m += 1
         n += 1
         _reverse(pending, before, waiting)
-    return error, n, m, fits
+    return error, n, m
 
 
-@njit
+@driver
 def _reverse(pending: Any, first: Any, end: Any) -> None:
     """Turn the order of the clones just made, so that the first comes off the stack first."""
     for k in range((end - first) // 2):
@@ -351,53 +373,75 @@ def _reverse(pending: Any, first: Any, end: Any) -> None:
         pending.key[i], pending.key[j] = pending.key[j], pending.key[i]
 
 
-@njit
+@driver
+def fits(tree: Any, whole: Any, sections: Any, first: Any, end: Any, part: Any) -> Any:
+    """Whether a family that was probed, shortened to a part of its length, is in the envelope."""
+    at = sections.position
+    x, y, z = at[first, 0], at[first, 1], at[first, 2]
+    for k in range(end - 1, first, -1):  # the far end is the first to be outside
+        u = x + part * (at[k, 0] - x)
+        v = y + part * (at[k, 1] - y)
+        w = z + part * (at[k, 2] - z)
+        if not inside(tree, whole, u, v, w):
+            return False
+    return True
+
+
+@driver
+def pruned_length(
+    number: Any, level: Any, tree: Any, whole: Any, origins: Any, o: Any, error: Any, base: Any,
+    hand: Any,
+) -> Any:  # fmt: skip
+    """Length at which a family is grown, m (4.6); 0 if it is none, -1 if there was no room.
+
+    No turn and no split depends on the length, so that one probe serves all lengths.
+    """
+    length = origins.length[o]
+    least = _LEAST * whole.scale
+    if tree.prune_ratio > 0.0 and number > 0 and length > least:
+        at = origins.position
+        short = 0.0
+        if inside(tree, whole, at[o, 0], at[o, 1], at[o, 2]):
+            short = length
+            probe = Hand(True, hand.shoots, hand.sections, hand.pending, hand.frame, hand.state)
+            _, n, m = grow_family(
+                number, level, tree, whole, origins, o, length, error, base, probe
+            )
+            if n < 0:
+                return -1.0
+            while short > least and not fits(
+                tree, whole, hand.sections, base[3], m, short / length
+            ):
+                short *= _SHRINK
+            if short <= least:
+                short = 0.0
+        length = (1.0 - tree.prune_ratio) * length + tree.prune_ratio * short
+    return length if length > least else 0.0
+
+
+@driver
 def grow_level(
-    number: Any,
-    tree: Any,
-    levels: Any,
-    whole: Any,
-    origins: Any,
-    before: Any,
-    shoots: Any,
-    sections: Any,
-    pending: Any,
+    number: Any, tree: Any, levels: Any, whole: Any, origins: Any, before: Any, hand: Any
 ) -> Any:
     """Grow all stems of a level; `before` = (stems, nodes) of the levels below.
 
-    Returns the number of stems and nodes made; -1 if the arrays are too short.
+    Returns the number of stems and nodes made; -1 if the arrays are too short. One after the
+    other, since the error of the splits is handed on.
     """
     level, whole_tree = levels[number], tree[0]
-    pruned = whole_tree.prune_ratio > 0.0 and number > 0
     error = 0.0
     n, m = np.int64(0), np.int64(0)
     for o in range(len(origins.key)):
-        length = origins.length[o]
-        base = (before[0], before[1], n, m)
-        if n >= len(shoots.key):
+        if n >= len(hand.shoots.key):
             return np.int64(-1), m
-        x, y, z = origins.position[o]
-        if pruned:
-            short = length if inside(whole_tree, whole, x, y, z) else 0.0
-            while short > _LEAST * whole.scale:
-                _, k, _, fits = grow_family(
-                    number, level, whole_tree, whole, origins, o, short, error, base,
-                    shoots, sections, pending,
-                )  # fmt: skip
-                if k < 0:
-                    return k, m
-                if fits:
-                    break
-                short *= _SHRINK
-            if short <= _LEAST * whole.scale:
-                short = 0.0
-            length = (1.0 - whole_tree.prune_ratio) * length + whole_tree.prune_ratio * short
-        if length <= _LEAST * whole.scale:
-            continue
-        error, n, m, _ = grow_family(
-            number, level, whole_tree, whole, origins, o, length, error, base,
-            shoots, sections, pending,
-        )  # fmt: skip
+        base = (before[0], before[1], n, m)
+        length = pruned_length(number, level, whole_tree, whole, origins, o, error, base, hand)
+        if length < 0.0:
+            return np.int64(-1), m
+        if length > 0.0:
+            error, n, m = grow_family(
+                number, level, whole_tree, whole, origins, o, length, error, base, hand
+            )
         if n < 0:
             return n, m
     return n, m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -157,6 +158,17 @@ class ParametricTree:
         self, time_s: float, wind_speed: float, gust: float = 0.0, *, time_scale: float = 1.0
     ) -> ParametricTree:
         """Give the tree at a moment of a wind; see `forest.parametric.sway.sway`."""
+        return next(self.frames([time_s], wind_speed, gust, time_scale=time_scale))
+
+    def frames(
+        self,
+        times_s: Iterable[float],
+        wind_speed: float,
+        gust: float = 0.0,
+        *,
+        time_scale: float = 1.0,
+    ) -> Iterator[ParametricTree]:
+        """Give the tree at moments of a wind, one by one; see `forest.parametric.sway.sway`."""
         from forest.parametric.sway import sway
 
-        return sway(self, time_s, wind_speed, gust, time_scale=time_scale)
+        return sway(self, times_s, wind_speed, gust, time_scale=time_scale)

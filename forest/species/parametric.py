@@ -16,6 +16,7 @@ from forest.species.text import parse_toml, read_text
 
 _FOLDER = Path(__file__).parents[1] / "parametric" / "species"
 _ANGLE: dict[str, Any] = {"unit": "degree", "ge": -720.0, "le": 720.0}
+_COLOUR = r"^#[0-9a-fA-F]{6}$"
 _SPREAD: dict[str, Any] = {"unit": "degree", "ge": 0.0, "le": 720.0}
 
 
@@ -46,7 +47,9 @@ class Level(Table):
         140.0, "turn about the parent from child to child; negative: sides alternate", **_ANGLE
     )
     rotate_variation: float = quantity(0.0, "± on it", **_SPREAD)
-    branches: int = quantity(0, "most children that a parent bears", ge=0, le=5000)
+    branches: int = quantity(
+        0, "most children that a parent bears; negative: in a fan at its end", ge=-5000, le=5000
+    )
 
 
 class Parameters(Table):
@@ -56,6 +59,15 @@ class Parameters(Table):
     common_name: str = quantity("", "what people call it", unit="")
     source: str = quantity("", "where the values come from", unit="")
     evergreen: bool = quantity(False, "whether it keeps its leaves in winter")
+    bark_colour: Annotated[str, Field(pattern=_COLOUR)] = quantity(
+        "#75695c", "colour of the bark in pictures", unit=""
+    )
+    leaf_colour: Annotated[str, Field(pattern=_COLOUR)] = quantity(
+        "#527f3e", "of the leaves in summer", unit=""
+    )
+    fall_colour: Annotated[str, Field(pattern=_COLOUR)] = quantity(
+        "#b8862f", "of the leaves in fall, unless it is evergreen", unit=""
+    )
     shape: int = quantity(0, "curve of the main branches' lengths, 0 to 8", ge=0, le=8)
     base_size: float = quantity(0.2, "bare share of the trunk", ge=0.0, lt=1.0)
     scale: float = quantity(10.0, "size of the tree", unit="m", gt=0.0, le=200.0)

@@ -87,10 +87,13 @@ class Description:
         Trunk, main branches and all other branches, in order of creation.
     leaves : Leaves
         In order of creation.
+    lobes : (int, float)
+        Number of peaks around the trunk, and their height as a share of its radius.
     """
 
     stems: tuple[Segments, ...]
     leaves: Leaves
+    lobes: tuple[int, float] = (0, 0.0)
 
     def drawn(self, shares: Fractions) -> Drawing:
         """Give what the paper's loop draws.
@@ -104,7 +107,7 @@ class Description:
         for level, stems in enumerate(self.stems):
             total = len(stems.internode)
             tubes = drawn(total, float(shares.stem_polygons[level]), STEM_MASS)
-            corners = _tubes(stems, tubes, SIDES[level])
+            corners = _tubes(stems, tubes, SIDES[level], self.lobes if level == 0 else (0, 0.0))
             triangles.append(
                 _primitives(corners, level, stems.internode[tubes].repeat(2 * SIDES[level]))
             )
@@ -118,11 +121,15 @@ class Description:
         middle = self.leaves.position[dots]
         middle = middle + 0.5 * self.leaves.length[dots, None] * self.leaves.direction[dots]
         return Drawing(
-            _together(triangles), _together(lines), _primitives(middle[:, None], LEAF_ITEM, dots)
+            _together(triangles),
+            _together(lines),
+            _primitives(middle[:, None].astype(np.float64), LEAF_ITEM, dots),
         )
 
 
-def describe(skeleton: Skeleton, leaves: Leaves) -> Description:
+def describe(
+    skeleton: Skeleton, leaves: Leaves, *, lobes: tuple[int, float] = (0, 0.0)
+) -> Description:
     """Sort a tree into the paper's four lists.
 
     Parameters
@@ -132,6 +139,8 @@ def describe(skeleton: Skeleton, leaves: Leaves) -> Description:
         cross section, so that tubes are closed; branches of order 2 and more are one list.
     leaves : Leaves
         `forest.trees.leaves.leaves_of` makes those of a simulated tree.
+    lobes : (int, float)
+        Lobes and LobeDepth of a parametric tree's trunk (section 4.4).
     """
     heading, side = carry_frames(skeleton)
     across = np.cross(heading, side)
@@ -151,16 +160,20 @@ def describe(skeleton: Skeleton, leaves: Leaves) -> Description:
     stems = tuple(
         Segments(*(field[by_axis[level == k]] for field in whole)) for k in range(LAST_LEVEL + 1)
     )
-    return Description(stems, leaves)
+    return Description(stems, leaves, lobes)
 
 
-def _tubes(stems: Segments, chosen: NDArray[np.int64], sides: int) -> _Array:
+def _tubes(
+    stems: Segments, chosen: NDArray[np.int64], sides: int, lobes: tuple[int, float]
+) -> _Array:
     """Give the corners (2 sides n, 3, 3) of tubes' triangles, seen from outside anticlockwise."""
     angle = 2.0 * np.pi * np.arange(sides) / sides
+    count, depth = lobes
+    factor = 1.0 + depth * np.sin(count * angle)
     ring = (
         stems.centre[chosen][:, :, None]
-        + np.cos(angle)[:, None] * stems.side[chosen][:, :, None]
-        + np.sin(angle)[:, None] * stems.across[chosen][:, :, None]
+        + (factor * np.cos(angle))[:, None] * stems.side[chosen][:, :, None]
+        + (factor * np.sin(angle))[:, None] * stems.across[chosen][:, :, None]
     )
     low, high = ring[:, 0], ring[:, 1]
     next_low, next_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)

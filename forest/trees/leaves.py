@@ -53,11 +53,14 @@ _UP = np.array([0.0, 0.0, 1.0])
 class Leaves(NamedTuple):
     """Leaves of one tree, in order of creation.
 
+    Those of parametric trees, which may have millions, are single precision; what all of them share
+    (`length`, `width`, `shape`) is held once and cannot be written to.
+
     Attributes
     ----------
-    position : float64 (m, 3)
+    position : float (m, 3)
         Where the blade begins, m, in the coordinates of the tree's skeleton.
-    direction, normal : float64 (m, 3)
+    direction, normal : float (m, 3)
         Unit vectors from the petiole to the tip, and away from the upper face.
     length, width : float64 (m,)
         Size of the blade, m.
@@ -67,9 +70,9 @@ class Leaves(NamedTuple):
         Number of the stem that bears it; for a `Skeleton`, of its axis.
     """
 
-    position: NDArray[np.float64]
-    direction: NDArray[np.float64]
-    normal: NDArray[np.float64]
+    position: NDArray[np.floating]
+    direction: NDArray[np.floating]
+    normal: NDArray[np.floating]
     length: NDArray[np.float64]
     width: NDArray[np.float64]
     shape: NDArray[np.int8]

@@ -17,7 +17,8 @@ from forest.view.shapes import gather_leaves, gather_wood, polylines
 _MOST_TUBES = 150_000  # internodes drawn as tubes, the thickest first
 _MOST_TWIGS = 700_000  # internodes drawn as lines
 _MOST_CARDS = 800_000
-_OVERSAMPLING = 2  # pixels are rendered twice as fine and averaged
+#: Pixels are rendered so many times as fine along each side, and averaged.
+OVERSAMPLING = 2
 _HALF_VIEW_DEG = 13.0
 _MARGIN = 1.06
 
@@ -87,10 +88,16 @@ class Scene:
         tubes = mesh.tube(scalars="radius", absolute=True, n_sides=8)
         normals = np.asarray(tubes.point_data["TubeNormals"], np.float64)
         points = np.asarray(tubes.points, np.float64)
+        tubes["rgb"] = self.lit_bark(points, normals, np.asarray(tubes["bark"]))
+        plotter.add_mesh(tubes, scalars="rgb", rgb=True, lighting=False)
+
+    def lit_bark(
+        self, points: NDArray[np.float64], normals: NDArray[np.float64], bark: NDArray[np.float64]
+    ) -> NDArray[np.uint8]:
+        """Colours of bark at points (n, 3) of these normals, lit by sun and sky."""
         sun, sky = self.light.at(points)
         around = 0.75 + 0.25 * normals[:, 2]
-        tubes["rgb"] = shade(np.asarray(tubes["bark"]), sun * _lambert(normals), 1.3 * sky * around)
-        plotter.add_mesh(tubes, scalars="rgb", rgb=True, lighting=False)
+        return shade(bark, sun * _lambert(normals), 1.3 * sky * around)
 
     def _add_twigs(self, plotter: Any, chosen: NDArray[np.int64]) -> None:
         if not len(chosen):
@@ -123,7 +130,7 @@ class Scene:
 def open_plotter(window: tuple[int, int], shape: tuple[int, int] = (1, 1)) -> Any:
     """Make an off-screen plotter whose pictures come out `window` pixels wide and high."""
     pv = import_pyvista()
-    size = [side * _OVERSAMPLING for side in window]
+    size = [side * OVERSAMPLING for side in window]
     return pv.Plotter(off_screen=True, window_size=size, shape=shape, border=False)
 
 
@@ -179,9 +186,14 @@ def save(plotter: Any, to: str | Path) -> None:
     """Render, average the fine pixels and write a PNG."""
     from PIL import Image
 
+    Image.fromarray(pixels(plotter)).save(Path(to))
+
+
+def pixels(plotter: Any) -> NDArray[np.uint8]:
+    """Render and average the fine pixels; gives (height, width, 3)."""
     fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
     plotter.close()
-    k = _OVERSAMPLING
+    k = OVERSAMPLING
     height, width = fine.shape[0] // k, fine.shape[1] // k
     mean = fine[: height * k, : width * k, :3].reshape(height, k, width, k, 3).mean(axis=(1, 3))
-    Image.fromarray(mean.round().astype(np.uint8)).save(Path(to))
+    return np.asarray(mean.round().astype(np.uint8))

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.benchmarks import bending, costs, machine, parametric, report, runs, stands
+from tests.benchmarks import bending, costs, frames, machine, parametric, report, runs, stands
 
 
 class Extent(NamedTuple):
@@ -26,15 +26,19 @@ class Extent(NamedTuple):
     rounds: tuple[int, ...]  # of each stand
     bending: tuple[int, int]  # tiles along each edge and rounds of the stand that bends
     run: tuple[str, ...]  # changes to the hectare
+    frame_trees: int  # of the stand view
     repeats: int  # of the paper's tree and of the warm start
 
 
-FULL = Extent(across=(2, 5, 17), rounds=(9, 5, 3), bending=(5, 3), run=(), repeats=3)
+FULL = Extent(
+    across=(2, 5, 17), rounds=(9, 5, 3), bending=(5, 3), run=(), frame_trees=10_000, repeats=3
+)
 QUICK = Extent(
     across=(1, 3),
     rounds=(5, 3),
     bending=(3, 3),
     run=("plot.size_m=[24, 24]", "years=30"),
+    frame_trees=2_000,
     repeats=1,
 )
 
@@ -64,6 +68,13 @@ def measure(extent: Extent) -> dict[str, Any]:
     result["run"] = _say("a run", machine.alone, runs.run_hectare, extent.run)
     result["parametric"] = _say(
         "parametric trees", machine.alone, parametric.measure_parametric, extent.repeats
+    )
+    result["frames"] = _say(
+        f"a view of {extent.frame_trees:,} trees",
+        machine.alone,
+        frames.measure_frames,
+        extent.frame_trees,
+        extent.repeats,
     )
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()

@@ -136,13 +136,39 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line("peak of the process, GB", (f"{tree['peak_gb']:.2f}",))
     forms = result["parametric"]
     yield Line("a parametric aspen, ms", (f"{1e3 * forms['aspen_s']:.1f}",))
-    yield Line("a leaf of a parametric willow, us", (f"{1e6 * forms['willow_leaf_s']:.2f}",))
+    willow = f"a parametric willow of {1e-6 * forms['willow_leaves']:.1f} million leaves, s"
+    yield Line(willow, (f"{forms['willow_s']:.2f}",))
+    threads = max(int(key.split("_")[2]) for key in forms if key.startswith("thousand_aspens"))
+    whole = f"{forms[f'thousand_aspens_{threads}_s']:.1f}"
+    yield Line(f"a thousand parametric aspens, {threads} threads, s", (whole,))
+    yield Line("an aspen's moment of wind, ms", (f"{1e3 * forms['sway_s']:.1f}",))
+    yield from _frame_lines(result["frames"])
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
     yield Line("cold, to the end of the first year, s", cold)
     yield Line("warm, to the end of the first year, s", (f"{starts['warm_s']:.2f}",))
     yield Line("forest --help, s", (f"{starts['help_s']:.2f}",))
+
+
+def _frame_lines(frames: dict[str, Any]) -> Iterator[Line]:
+    one, most = (frames["threads"][key(frames["threads"])] for key in (min, max))
+    seen = f"{frames['seen']:,} seen, {frames['primitives'] / 1e6:.1f} million primitives"
+    yield Line(f"A view of {frames['trees']:,} aspens of 8 models: {seen}", ())
+    for key, busy, what in (
+        ("plain_s", "", "the frame without shade, s"),
+        ("shaded_s", "shaded_cpu_s", "the frame, s"),
+        ("million_s", "million_cpu_s", "the frame, s per million primitives"),
+    ):
+        cpu = f"{most[busy]:.3g}" if busy else ""
+        cells = (f"{most[key]:.3g}", cpu, f"{one[key]:.3g}", f"{one[key] / most[key]:.2f}")
+        yield Line(what, cells)
+    for key, what in (
+        ("lists_s", "once: the models' lists, s"),
+        ("own_shadows_s", "once a sun: the models' own shadows, s"),
+        ("scene_shadow_s", "once a sun: the scene's shadow map, s"),
+    ):
+        yield Line(what, (f"{frames[key]:.2f}",))
 
 
 def show(result: dict[str, Any]) -> None:

@@ -9,6 +9,7 @@ from tests.benchmarks.runs import PAPER_INTERNODES
 
 #: A stand of at least so many metamers with a living site is held to the cost of a large one.
 _LARGE = 5_000_000
+_FRAME_TREES = 10_000
 _HECTARE = {"plot_m": 100.0, "years": 100}
 
 
@@ -53,6 +54,10 @@ def verdicts(result: dict[str, Any]) -> Iterator[Verdict]:
     yield Verdict("the same, aim", timed["bend_ns"] / 1e3, "≤", 0.6)
     changed = timed["again_ns"] / timed["wall_ns"]["settle"]
     yield Verdict("settling where nothing has changed, of a year's", changed, "≤", 0.5)
+    frames = result["frames"]
+    if frames["trees"] >= _FRAME_TREES:
+        frame = frames["threads"][max(frames["threads"])]
+        yield Verdict("a frame of 10,000 trees, s", frame["shaded_s"], "≤", 2.0)
     yield Verdict("share of writing", run["writing_share"], "≤", 0.10)
     yield Verdict("cold start, s", starts["cold_s"], "≤", 45.0)
     yield Verdict("warm start, s", starts["warm_s"], "≤", 2.0)

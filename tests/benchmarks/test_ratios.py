@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from tests.benchmarks.costs import exponent, measure_stand, thread_counts
+from tests.benchmarks.frames import measure_frames
 from tests.benchmarks.machine import alone
 from tests.benchmarks.runs import run_hectare
 from tests.benchmarks.stands import keep_tile
@@ -36,3 +37,10 @@ def test_two_threads_help_and_change_nothing(stands: list[dict[str, Any]]) -> No
 def test_writing_is_a_small_share_of_a_run() -> None:
     run = alone(run_hectare, ("plot.size_m=[24, 24]", "years=30"))
     assert run["writing_share"] <= 0.25  # a few milliseconds a year, whatever the size
+
+
+def test_a_frame_costs_what_it_draws() -> None:
+    """Ten times the trees do not make a primitive dearer, nor does shade outweigh the drawing."""
+    few, many = (alone(measure_frames, trees, 3)["threads"][1] for trees in (300, 3000))
+    assert many["million_cpu_s"] <= 1.5 * few["million_cpu_s"]
+    assert many["shaded_s"] <= 2.5 * many["plain_s"]

@@ -50,7 +50,7 @@ def radius_at(taper: float, radius: float, length: float, z: float) -> float:
     """radius_Z of 4.4, without flare."""
     unit = taper if taper < 1 else max(0.0, 2 - taper)
     pure = radius * (1 - unit * z)
-    if taper < 1:
+    if taper < 1 or pure <= 0:
         return pure
     z2 = (1 - z) * length
     depth = 1.0 if taper < 2 or z2 < pure else taper - 2
@@ -248,7 +248,7 @@ class Tree:
         p, n = self.p, stem.level
         last = n + 1 == p.depth
         level = p.of_level(n + 1)
-        most = abs(p.leaves) if last else level.branches
+        most = abs(p.leaves if last else level.branches)
         share = 1 - 0.5 * stem.reach
         if n == 0:
             share = 1.0
@@ -266,8 +266,12 @@ class Tree:
                 continue
             if turned is None:
                 turned = level.rotate * j
-            u, v, w, _ = draw(self.seed, stem.key, (OF_LEAF if last else OF_CHILD) + j)
-            turned = self.child(stem, level, j, count, z, turned, (u, v, w), last, base)
+            if last:  # a draw serves two leaves
+                four = draw(self.seed, stem.key, OF_LEAF + j // 2)
+                chance = (*four[2 * (j % 2) : 2 * (j % 2) + 2], 0.0)
+            else:
+                chance = draw(self.seed, stem.key, OF_CHILD + j)[:3]
+            turned = self.child(stem, level, j, count, z, turned, chance, last, base)
 
     def child(
         self, stem: Stem, level: Level, j: int, count: int, z: float, turned: float,
@@ -275,9 +279,10 @@ class Tree:
     ) -> float:  # fmt: skip
         p = self.p
         u, v, w = chance
-        fan = last and p.leaves < 0
+        fan = (p.leaves if last else level.branches) < 0
         at = 1.0 if fan else z
-        below = max(i for i in range(len(stem.z) - 1) if i == 0 or stem.z[i] <= at + 1e-12)
+        near = at + 1e-9 * (stem.z[1] - stem.z[0])
+        below = max(i for i in range(len(stem.z) - 1) if i == 0 or stem.z[i] <= near)
         f = stem.frame[below]
         place = stem.place[below] + (at - stem.z[below]) * stem.length * f[:, 2]
         ratio = (stem.length * (1 - z)) / (stem.length - base)
@@ -296,6 +301,8 @@ class Tree:
         if last:
             self.leaves.append((place, f))
             return turned
+        z = at
+        ratio = (stem.length * (1 - z)) / (stem.length - base)
         most = max(0.0, level.length + (2 * w - 1) * level.length_variation)
         length = most * (stem.length - 0.6 * z * stem.length)
         if stem.level == 0:

@@ -120,3 +120,19 @@ def test_half_a_pole_is_spread_over_the_pole() -> None:
     assert list(np.unique(drawing.triangles.element) // 16) == list(np.repeat(np.arange(10), 8))
     assert len(drawing.lines.element) == 160
     assert len(drawing.points.element) == 0
+
+
+def test_a_lobed_trunk() -> None:
+    tree = bush(3, 12)
+    shares = fractions(1.0, evergreen=False)
+    round_, lobed = (
+        describe(tree, no_leaves(), lobes=lobes).drawn(shares).triangles
+        for lobes in ((3, 0.0), (3, 0.25))
+    )
+    trunk = round_.item == 0
+    np.testing.assert_array_equal(round_.vertices[~trunk], lobed.vertices[~trunk])
+    first = np.flatnonzero(trunk)[: 2 * SIDES[0] : 2]  # lower corners of the trunk's foot
+    foot = tree.start[round_.element[first[0]]]
+    was, now = (np.linalg.norm(t.vertices[first, 0] - foot, axis=1) for t in (round_, lobed))
+    angle = 2.0 * np.pi * np.arange(SIDES[0]) / SIDES[0]
+    np.testing.assert_allclose(now / was, 1.0 + 0.25 * np.sin(3.0 * angle))
