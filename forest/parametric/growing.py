@@ -12,7 +12,6 @@ from forest._threads import in_threads
 from forest.errors import InputError
 from forest.parametric.alone import grow_alone, probe_alone, scratch
 from forest.parametric.bearing import bear_leaves, count_children, spring
-from forest.parametric.parameters import Parameters, load_parameters, pack
 from forest.parametric.stems import (
     OF_SELF,
     Hand,
@@ -26,6 +25,7 @@ from forest.parametric.stems import (
     sections_of,
 )
 from forest.parametric.tree import Joints, Nodes, ParametricTree, Stems
+from forest.species.parametric import Parameters, load_parameters, pack
 from forest.trees.leaves import Leaves
 
 #: The most stems of a tree, its most cross sections, and its most leaves.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.parametric.parameters import Parameters
+from forest.species.parametric import Parameters
 from forest.trees.leaves import Leaves
 from forest.trees.skeleton import Skeleton
 

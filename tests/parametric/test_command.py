@@ -10,7 +10,7 @@ import pytest
 from forest.cli import main
 from forest.interop import read_simpleforest
 from forest.parametric import grow
-from forest.parametric.parameters import parametric_names
+from forest.species.parametric import parametric_names
 from forest.view.parametric_picture import lobed_trunk
 
 _WILD = ("--set", "0SegSplits=9", "--set", "0CurveRes=50", "--set", "clone_habit=1")

@@ -11,7 +11,7 @@ from forest._threads import using_threads
 from forest.errors import InputError
 from forest.parametric import Parameters, from_paper, grow, grow_many, load_parameters
 from forest.parametric.growing import Readings
-from forest.parametric.parameters import parametric_names
+from forest.species.parametric import parametric_names
 from tests.reference.weber_penn import reference_tree
 
 _READINGS: tuple[Readings, ...] = ("paper", "corrected")

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from forest.parametric.parameters import Level, Parameters
 from forest.parametric.stems import OF_CHILD, OF_CLONE, OF_LEAF, OF_SELF, OF_SPLIT, descend, draw
+from forest.species.parametric import Level, Parameters
 
 Matrix = Any
 

@@ -182,8 +182,8 @@ def test_sample_trees_of_a_run_are_spread_like_others(scene: Path, run_file: Pat
 
 
 def test_without_shapes_parametric_trees_stand_in(tmp_path: Path) -> None:
-    from forest.parametric.parameters import parametric_names
     from forest.species import species_names
+    from forest.species.parametric import parametric_names
 
     assert set(STAND_INS) == set(species_names())
     assert set(STAND_INS.values()) <= set(parametric_names())

@@ -14,7 +14,7 @@ from forest.errors import InputError, nearest
 from forest.species.schema import Refusal, Table, quantity, refusal
 from forest.species.text import parse_toml, read_text
 
-_FOLDER = Path(__file__).parent / "species"
+_FOLDER = Path(__file__).parents[1] / "parametric" / "species"
 _ANGLE: dict[str, Any] = {"unit": "degree", "ge": -720.0, "le": 720.0}
 _COLOUR = r"^#[0-9a-fA-F]{6}$"
 _SPREAD: dict[str, Any] = {"unit": "degree", "ge": 0.0, "le": 720.0}
