@@ -1,9 +1,12 @@
 """Bark that tears as the tree thickens (Lefebvre and Neyret 2002)."""
 
+from forest.surface.bark.growing import Bark, Snapshot, grow_bark
+from forest.surface.bark.material import Material, fracture_range
+from forest.surface.bark.shrinking import shrinking
 from forest.surface.bark.strips import (
     EPIDERMIS,
     FRACTURE,
-    Bark,
+    Crossings,
     Elements,
     Fractures,
     StripGeometry,
@@ -15,9 +18,15 @@ __all__ = [
     "EPIDERMIS",
     "FRACTURE",
     "Bark",
+    "Crossings",
     "Elements",
     "Fractures",
+    "Material",
+    "Snapshot",
     "StripGeometry",
     "Strips",
     "Tears",
+    "fracture_range",
+    "grow_bark",
+    "shrinking",
 ]

@@ -7,8 +7,7 @@ and Neyret 2002, 3.2.2). Fractures of neighbouring strips that were torn one fro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +21,33 @@ FRACTURE = 1
 GRAIN_M = 2.0**-30
 
 
-class StripGeometry(NamedTuple):
-    """Where the strips lie: one row per strip, base to tip, axis after axis.
+class Crossings(NamedTuple):
+    """Where fractures leave one axis for another: one row per passage.
 
-    `crossing` tells where a fracture leaves its axis: row k says that one which runs from strip
-    `crossing_from[k]` (up or down) at an angle within `crossing_half[k]` of `crossing_angle[k]` goes
-    on in strip `crossing_to[k]` at `crossing_enters[k]` plus the same angle's offset times
-    `crossing_scale[k]`. Angles are parts of a turn from the strip's seam, 0 to 1.
+    A fracture that would run on from strip `strip` in the direction `runs` (+1 towards the tip, -1
+    towards the base) at an angle within `half` of `angle` stops on its axis and goes on in strip
+    `to`, at the angle `enters + scale * (its angle - angle)`, in the direction `goes`. Angles are
+    parts of a turn from the strip's seam.
     """
+
+    strip: NDArray[np.int32]
+    runs: NDArray[np.int8]
+    angle: NDArray[np.float64]
+    half: NDArray[np.float64]
+    to: NDArray[np.int32]
+    enters: NDArray[np.float64]
+    scale: NDArray[np.float64]  # -1 and the like where the seams turn the other way
+    goes: NDArray[np.int8]
+
+    @classmethod
+    def none(cls) -> Crossings:
+        """Give no passages."""
+        i, b, f = np.empty(0, np.int32), np.empty(0, np.int8), np.empty(0)
+        return cls(i, b, f, f, i, f, f, b)
+
+
+class StripGeometry(NamedTuple):
+    """Where the strips lie: one row per strip, base to tip, axis after axis."""
 
     axis: NDArray[np.int32]  # which axis (source limb)
     along: NDArray[np.float64]  # v of the strip's middle, m from the base of its axis
@@ -37,14 +55,22 @@ class StripGeometry(NamedTuple):
     neighbour_up: NDArray[np.int32]  # the strip above on the same axis; -1 none
     neighbour_down: NDArray[np.int32]  # the strip below; -1 none
     width_around: NDArray[np.float64]  # (strips, sectors) factor on `width` around the girth: less
-    # than 1 on the concave side of a curved axis; or (strips, 0) for 1 everywhere
-    crossing_from: NDArray[np.int32]  # (crossings)
-    crossing_up: NDArray[np.int8]  # +1 for fractures that run up, -1 down, 0 both
-    crossing_angle: NDArray[np.float64]
-    crossing_half: NDArray[np.float64]
-    crossing_to: NDArray[np.int32]
-    crossing_enters: NDArray[np.float64]
-    crossing_scale: NDArray[np.float64]
+    # than 1 on the concave side of a curved axis; (strips, 1) of ones for straight axes
+    crossings: Crossings
+
+    @classmethod
+    def column(cls, strips: int, width_m: float) -> StripGeometry:
+        """Give the strips of one straight axis."""
+        k = np.arange(strips, dtype=np.int32)
+        return cls(
+            axis=np.zeros(strips, np.int32),
+            along=(k + 0.5) * width_m,
+            width=np.full(strips, width_m),
+            neighbour_up=np.where(k + 1 < strips, k + 1, -1).astype(np.int32),
+            neighbour_down=(k - 1).astype(np.int32),
+            width_around=np.ones((strips, 1)),
+            crossings=Crossings.none(),
+        )
 
 
 class Strips(NamedTuple):
@@ -85,6 +111,23 @@ class Elements(NamedTuple):
         rest = (column[a:b] for column in self[1:])
         return Elements(np.array([0, b - a]), *rest)
 
+    def at(
+        self, strip: int, x: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Find what lies at x m around the girth of a strip.
+
+        Returns
+        -------
+        (int64, float64)
+            Rows of the elements, and which part of the element (0 to 1) lies to the left.
+        """
+        a, b = int(self.offsets[strip]), int(self.offsets[strip + 1])
+        begin, girth = self.start[a], float(np.sum(self.width[a:b]))
+        around = begin + np.mod(np.asarray(x, np.float64) - begin, girth)
+        rows = a + np.searchsorted(self.start[a:b], around, side="right") - 1
+        part = np.clip((around - self.start[rows]) / np.maximum(self.width[rows], 1e-300), 0.0, 1.0)
+        return rows, part
+
 
 class Tears(NamedTuple):
     """The nodes of the fracture skeleton: one row per fracture element, in order of birth."""
@@ -108,18 +151,3 @@ class Fractures(NamedTuple):
     width: NDArray[np.float64]  # mean opening, m
     born: NDArray[np.float64]
     generation: NDArray[np.int32]  # 0; 1 where the surface of generation 0 tore again, ...
-
-
-@dataclass(frozen=True)
-class Bark:
-    """Bark at one time. `grow` and `trigger` give another one; nothing in it changes."""
-
-    strips: Strips
-    elements: Elements
-    tears: Tears
-    fractures: Fractures
-    time: float  # steps since the epidermis was whole
-
-    def of_axis(self, axis: int) -> NDArray[Any]:
-        """Give the rows of the strips of an axis, base to tip."""
-        return np.flatnonzero(self.strips.axis == axis)
