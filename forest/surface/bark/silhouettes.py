@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from forest._jit import njit
 from forest.errors import InputError
-from forest.surface.bark.strips import FRACTURE, Bark
+from forest.surface.bark.growing import Bark
+from forest.surface.bark.strips import FRACTURE
 
 _Floats = NDArray[np.float64]
 _Indices = NDArray[np.int64]
@@ -97,7 +98,7 @@ def silhouettes(bark: Bark, axis: int = 0) -> Silhouettes:
     InputError
         The bark has no such axis.
     """
-    rows = bark.of_axis(axis)
+    rows = np.flatnonzero(bark.strips.axis == axis)
     if not len(rows):
         known = ", ".join(map(str, np.unique(bark.strips.axis)[:8]))
         raise InputError(f"no axis {axis}", where="bark", expected=f"one of {known}")
