@@ -207,6 +207,8 @@ def outline_row(
             fracture[x] = -1
             epidermis[x] = (x + 0.5) / n + shift
         return
+    for x in range(n):
+        fracture[x] = -1
     last = 0  # whose right border lies farthest: what is left of the gap
     for j in range(count):
         if line[j, 1] > line[last, 1]:
@@ -215,7 +217,7 @@ def outline_row(
         turn = 0.0 if j + 1 < count else 1.0
         _fill_gap(
             line[last], line[after], turn, girth, relief.shoulder[row], relief.reach[row],
-            depth, inside, epidermis, across, fracture,
+            depth, inside, epidermis, across,
         )  # fmt: skip
     for j in range(count):
         _fill_fracture(
@@ -227,7 +229,7 @@ def outline_row(
 @njit
 def _fill_gap(
     a: Any, b: Any, turn: Any, girth: Any, shoulder: Any, reach: Any,
-    depth: Any, inside: Any, epidermis: Any, across: Any, fracture: Any,
+    depth: Any, inside: Any, epidermis: Any, across: Any,
 ) -> None:  # fmt: skip
     """Epidermis between the right border of `a` and the left border of `b`, `turn` turns on."""
     n = len(depth)
@@ -246,7 +248,6 @@ def _fill_gap(
         depth[x] = sunk
         inside[x] = 0.0
         across[x] = 0.0
-        fracture[x] = -1
         epidermis[x] = own + (other - own) * (at - left) / (right - left) - (i // n)
 
 

@@ -6,7 +6,9 @@ Lengths in mm, since that is how one measures bark; colours as in a painter's pr
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from forest.species.schema import Refusal, Table, quantity
 
@@ -74,8 +76,9 @@ class Recipe(Table):
         1.0, "relief from black to white of that picture", unit="mm", ge=0, le=50
     )
 
-    def model_post_init(self, context: object) -> None:
-        """Check colours."""
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
         for colour in self.colours:
             if not all(0 <= value <= 255 for value in colour):
                 raise Refusal(f"colour {colour}", key="colours", expected="numbers 0 to 255")
+        return self
