@@ -294,7 +294,7 @@ def _whole(
         count=sites,
         cell=cell,
         spot=np.zeros(cell[-1], np.float32),
-        strength=np.zeros(cell[-1], np.float32),
+        drawn=np.zeros(cell[-1], np.float32),
         weakness=np.zeros(cell[-1], np.float32),
         **{name: records() for name in _RECORDS},
         tear=np.full(base[-1], -1, np.int32),
@@ -357,12 +357,12 @@ def _advance(
     rings.limit[:] = pace if threshold is None else threshold - 1.0
     rings.limit[growth <= 0.0] = 0.0
     edges = _stretched(rings.edges, rings.girth, girth, spread)
-    physics = Physics.of(bark.material)
+    physics = Physics.of(bark.material, substeps)
     worst = np.zeros(len(girth))
     in_threads(stretch_all, rings, physics, girth, edges, worst)
     order = np.argsort(-worst, kind="stable")
     crossings = bark.geometry.crossings
-    tear_all(rings, physics, np.int64(bark.seed), crossings, order, worst, time)
+    tear_all(rings, physics, np.int64(bark.seed), crossings, order, time)
     return rings
 
 

@@ -13,7 +13,7 @@ from forest.surface.bark.rings import overload, rest_of, turn_of, x_of
 
 _UP = np.int64(1)
 _DOWN = np.int64(-1)
-_STRAY = np.int64(3)  # what a draw is for: four ids to an axis
+_STRAY = np.int64(2)  # what a draw is for: four ids to an axis
 
 
 @njit
@@ -192,11 +192,13 @@ def run_on(
     runs = _UP if upper else _DOWN
     if ahead >= 0 and behind < 0 and rings.first[fracture] != rings.last[fracture]:
         runs = -runs  # it came over a passage that turned it round
+    run = 0.0
     while True:
         reach = rings.reach[fracture]
         opened = rings.area[fracture]
-        if reach >= physics.flaw_m and not reach * reach > physics.inglis * opened:
-            return
+        if reach >= physics.flaw_m:
+            if run > physics.run_m or not reach * reach > physics.inglis * opened:
+                return
         new, goes = _step(rings, physics, seed, crossings, node, runs, time)
         if new < 0:
             return
@@ -214,6 +216,7 @@ def run_on(
             rings.first[fracture] = new
         to = rings.tear_strip[new]
         rings.reach[fracture] += rings.width[to]
+        run += rings.width[to]
         settle(rings, physics, to)
         node = np.int64(new)
         runs = goes
@@ -250,7 +253,7 @@ def begin_fracture(
 
 @njit
 def tear_all(
-    rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, worst: Any, time: Any
+    rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, time: Any
 ) -> None:
     """Let everything break that must, after the strips were stretched.
 
@@ -269,10 +272,8 @@ def tear_all(
         run_on(rings, physics, seed, crossings, f, True, time)
         run_on(rings, physics, seed, crossings, f, False, time)
     for s in order:
-        if worst[s] <= np.exp(-3.0 * physics.threshold_jitter):
-            break
         while True:
-            i = worst_piece(rings, physics, seed, s)
+            i = worst_piece(rings, physics, s)
             if i < 0:
                 break
             begin_fracture(rings, physics, seed, crossings, s, i, rings.weak[i], time)

@@ -37,7 +37,7 @@ class Rings(NamedTuple):
     cell: NDArray[np.int64]  # (strips + 1) first grain
     # one row per grain of epidermis
     spot: NDArray[np.float32]  # where in it the weakest place is, m
-    strength: NDArray[np.float32]
+    drawn: NDArray[np.float32]  # its strength, in standard deviations
     weakness: NDArray[np.float32]  # of the weakness map, 0 to 1
     # one row per record
     place: NDArray[np.float64]  # on the epidermis, m
