@@ -38,7 +38,8 @@ def _weigh(rings: Any, physics: Any, seed: Any, weakness: Any, s: Any) -> None:
         above, _ = normals(seed, STREAM_BARK, name + _PLACE, row + 1, j)
         shift, _, _, _ = uniforms(seed, STREAM_BARK, name + _SPOT, row, j)
         drawn = (a * here + part * above) / np.sqrt(a * a + part * part)
-        spot = min((j + 0.1 + 0.8 * shift) * physics.grain_m, rings.length[s])
+        begin = j * physics.grain_m
+        spot = begin + (0.1 + 0.8 * shift) * min(physics.grain_m, rings.length[s] - begin)
         weak = 1.0  # without a map all is equally weak
         if samples > 0:
             weak = weakness[s, min(np.int64(spot / rings.length[s] * samples), samples - 1)]
@@ -48,9 +49,7 @@ def _weigh(rings: Any, physics: Any, seed: Any, weakness: Any, s: Any) -> None:
 
 
 @driver
-def weigh_all(
-    first: Any, step: Any, rings: Any, physics: Any, seed: Any, weakness: Any
-) -> None:
+def weigh_all(first: Any, step: Any, rings: Any, physics: Any, seed: Any, weakness: Any) -> None:
     """Draw the strength of all grains."""
     n = len(rings.count)
     for chunk in range(first, CHUNKS, step):
@@ -92,6 +91,12 @@ def room_to_break(rings: Any, physics: Any, s: Any, i: Any) -> Any:
 
 
 @njit
+def contrast(rings: Any, physics: Any, grain: Any) -> Any:
+    """Factor on the strain that a grain bears, by the weakness map; 1 where that is 1."""
+    return 1.0 + physics.weakness_contrast * (1.0 - rings.weakness[grain])
+
+
+@njit
 def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
     """Find the weakest place of the piece behind record i, and how much it bears.
 
@@ -103,8 +108,6 @@ def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
     middle = 0.5 * (lo + hi)
     rings.weak[i] = middle
     rings.tough[i] = _FAR
-    if hi - lo < 4.0 * GRAIN_M:
-        return
     best = -1
     least = np.inf
     first = max(np.int64(lo / physics.grain_m), 0)
@@ -117,13 +120,11 @@ def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
         if strength < least or (strength == least and nearer):
             least = strength
             best = k
-    if best < 0:  # less room than a grain
-        best = cells + min(first, rings.cell[s + 1] - cells - 1)
-    else:
-        rings.weak[i] = rings.spot[best]
-    rings.tough[i] = np.exp(physics.threshold_jitter * rings.drawn[best]) * (
-        1.0 + physics.weakness_contrast * (1.0 - rings.weakness[best])
-    )
+    if best < 0:
+        return
+    rings.weak[i] = rings.spot[best]
+    rings.tough[i] = np.exp(physics.threshold_jitter * rings.drawn[best])
+    rings.tough[i] *= contrast(rings, physics, best)
 
 
 @njit
@@ -150,13 +151,14 @@ def tear(rings: Any, s: Any, i: Any, place: Any, fracture: Any, time: Any) -> An
     """Break the piece behind record i at a place: a fracture between two pieces (figure 6).
 
     The parts' stiffnesses follow from their own lengths, which sum to that of the piece. Returns
-    the tear, or -1 where the place would leave nothing on one side.
+    the tear, or -1 where there is nothing to part.
     """
-    place = np.round(place / GRAIN_M) * GRAIN_M
     rest = rest_of(rings, s, i)
-    part = (place - rings.place[i]) / rest
-    if not 0.0 < part < 1.0:
+    if rest < 2.0 * GRAIN_M:
         return np.int64(-1)
+    place = np.round(place / GRAIN_M) * GRAIN_M - rings.place[i]
+    place = rings.place[i] + min(max(place, GRAIN_M), rest - GRAIN_M)
+    part = (place - rings.place[i]) / rest
     end = rings.base[s] + rings.count[s]
     right = rings.left[i] + rings.open[i]
     following = rings.grip_left[i + 1] if i + 1 < end else rings.grip_left[rings.base[s]]

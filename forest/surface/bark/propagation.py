@@ -8,7 +8,7 @@ import numpy as np
 
 from forest._jit import njit
 from forest.random import STREAM_BARK, uniforms
-from forest.surface.bark.fracture import nearest_fracture, settle, tear, worst_piece
+from forest.surface.bark.fracture import contrast, nearest_fracture, settle, tear, worst_piece
 from forest.surface.bark.rings import overload, rest_of, turn_of, x_of
 
 _UP = np.int64(1)
@@ -163,11 +163,12 @@ def _step(
         if side == 0 or gap < physics.stand_off * _mean_width(rings, other):
             return none, goes
     k, x = _piece_at(rings, to, x)
-    flawed = rings.reach[fracture] < physics.flaw_m
-    if not flawed and not overload(rings, to, k) >= physics.arrest:
-        return none, goes
     part = (x - rings.left[k] - rings.open[k]) / rings.piece[k]
     place = rings.place[k] + part * rest_of(rings, to, k)
+    grain = rings.cell[to] + np.int64(place / physics.grain_m)
+    needed = physics.arrest * contrast(rings, physics, min(grain, rings.cell[to + 1] - 1))
+    if rings.reach[fracture] >= physics.flaw_m and not overload(rings, to, k) >= needed:
+        return none, goes
     for way in (_DOWN, _UP):
         j, turns = nearest_fracture(rings, to, k, way)
         if j >= 0:
@@ -252,9 +253,7 @@ def begin_fracture(
 
 
 @njit
-def tear_all(
-    rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, time: Any
-) -> None:
+def tear_all(rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, time: Any) -> None:
     """Let everything break that must, after the strips were stretched.
 
     Fractures that are there run on first: their ends bear the most. Then strips break, the most

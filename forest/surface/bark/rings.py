@@ -30,7 +30,9 @@ class Rings(NamedTuple):
     factor: NDArray[np.float64]  # (strips, sectors) width around the girth
     length: NDArray[np.float64]  # L0
     girth: NDArray[np.float64]  # (strips) now
-    edges: NDArray[np.float64]  # (strips, sectors + 1) where the sectors of growth end, m from the seam
+    edges: NDArray[
+        np.float64
+    ]  # (strips, sectors + 1) where the sectors of growth end, m from the seam
     limit: NDArray[np.float64]  # S - 1 in this step
     base: NDArray[np.int64]  # first record
     count: NDArray[np.int64]  # records
