@@ -13,9 +13,9 @@ from forest.surface.bark.strips import GRAIN_M
 
 # What a draw is for: four ids to an axis.
 _PLACE = np.int64(0)
-_THRESHOLD = np.int64(1)
-_SPOT = np.int64(2)
+_SPOT = np.int64(1)
 _FAR = np.inf
+_MOST = 4.0  # standard deviations
 
 
 @njit
@@ -23,7 +23,7 @@ def _weigh(rings: Any, physics: Any, seed: Any, weakness: Any, s: Any) -> None:
     """Draw how strong the grains of one strip are; neighbouring strips see much the same field.
 
     Strength is a normal number per grain around the girth and row of grains along the axis,
-    faded from row to row; a weakness map (samples around the epidermis, 0 to 1) is taken off.
+    faded from row to row; beside it stands the weakness map (samples around the epidermis).
     """
     lo = rings.cell[s]
     n = rings.cell[s + 1] - lo
@@ -38,19 +38,18 @@ def _weigh(rings: Any, physics: Any, seed: Any, weakness: Any, s: Any) -> None:
         above, _ = normals(seed, STREAM_BARK, name + _PLACE, row + 1, j)
         shift, _, _, _ = uniforms(seed, STREAM_BARK, name + _SPOT, row, j)
         drawn = (a * here + part * above) / np.sqrt(a * a + part * part)
-        spot = min((j + 0.1 + 0.8 * shift) * physics.grain_m, rings.length[s])
-        weak = 0.0
+        begin = j * physics.grain_m
+        spot = begin + (0.1 + 0.8 * shift) * min(physics.grain_m, rings.length[s] - begin)
+        weak = 1.0  # without a map all is equally weak
         if samples > 0:
             weak = weakness[s, min(np.int64(spot / rings.length[s] * samples), samples - 1)]
         rings.spot[lo + j] = spot
-        rings.strength[lo + j] = physics.place_jitter * drawn - weak
-        rings.weakness[lo + j] = weak if samples > 0 else 1.0
+        rings.drawn[lo + j] = min(max(drawn, -_MOST), _MOST)
+        rings.weakness[lo + j] = weak
 
 
 @driver
-def weigh_all(
-    first: Any, step: Any, rings: Any, physics: Any, seed: Any, weakness: Any
-) -> None:
+def weigh_all(first: Any, step: Any, rings: Any, physics: Any, seed: Any, weakness: Any) -> None:
     """Draw the strength of all grains."""
     n = len(rings.count)
     for chunk in range(first, CHUNKS, step):
@@ -92,64 +91,55 @@ def room_to_break(rings: Any, physics: Any, s: Any, i: Any) -> Any:
 
 
 @njit
-def seek_weakest(rings: Any, physics: Any, seed: Any, s: Any, i: Any) -> None:
+def contrast(rings: Any, physics: Any, grain: Any) -> Any:
+    """Factor on the strain that a grain bears, by the weakness map; 1 where that is 1."""
+    return 1.0 + physics.weakness_contrast * (1.0 - rings.weakness[grain])
+
+
+@njit
+def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
     """Find the weakest place of the piece behind record i, and how much it bears.
 
-    Where all is equally strong, the middle.
+    A piece is as strong as its weakest grain, so long ones break before short ones. Where all is
+    equally strong, the place is the middle.
     """
     lo, hi = room_to_break(rings, physics, s, i)
     cells = rings.cell[s]
     middle = 0.5 * (lo + hi)
+    rings.weak[i] = middle
+    rings.tough[i] = _FAR
     best = -1
-    for j in range(
-        max(np.int64(lo / physics.grain_m), 0),
-        min(np.int64(hi / physics.grain_m) + 1, rings.cell[s + 1] - cells),
-    ):
+    least = np.inf
+    first = max(np.int64(lo / physics.grain_m), 0)
+    for j in range(first, min(np.int64(hi / physics.grain_m) + 1, rings.cell[s + 1] - cells)):
         k = cells + j
         if not lo < rings.spot[k] < hi:
             continue
-        if (
-            best < 0
-            or rings.strength[k] < rings.strength[best]
-            or (
-                rings.strength[k] == rings.strength[best]
-                and abs(rings.spot[k] - middle) < abs(rings.spot[best] - middle)
-            )
-        ):
+        strength = physics.place_jitter * rings.drawn[k] - rings.weakness[k]
+        nearer = best >= 0 and abs(rings.spot[k] - middle) < abs(rings.spot[best] - middle)
+        if strength < least or (strength == least and nearer):
+            least = strength
             best = k
-    if hi - lo < 4.0 * GRAIN_M:
-        rings.weak[i] = middle
-        rings.tough[i] = _FAR
+    if best < 0:
         return
-    rings.weak[i] = middle
-    number = np.int64(middle / physics.grain_m)
-    if best >= 0:
-        rings.weak[i] = rings.spot[best]
-        number = best - cells
-    drawn = 0.0
-    if physics.threshold_jitter > 0.0:
-        row = np.int64(np.floor(rings.along[s] / physics.grain_along_m))
-        name = 4 * np.int64(rings.axis[s]) + _THRESHOLD
-        drawn, _ = normals(seed, STREAM_BARK, name, row, number)
-    strong = 1.0 - rings.weakness[best] if best >= 0 else 0.0
-    rings.tough[i] = np.exp(physics.threshold_jitter * min(max(drawn, -3.0), 3.0)) * (
-        1.0 + physics.weakness_contrast * strong
-    )
+    rings.weak[i] = rings.spot[best]
+    rings.tough[i] = np.exp(physics.threshold_jitter * rings.drawn[best])
+    rings.tough[i] *= contrast(rings, physics, best)
 
 
 @njit
-def worst_piece(rings: Any, physics: Any, seed: Any, s: Any) -> Any:
+def worst_piece(rings: Any, physics: Any, s: Any) -> Any:
     """Find the piece of a strip most beyond its threshold: its record, or -1."""
     worst = np.int64(-1)
     most = 1.0 + 1e-9  # growth ratios carry rounding
-    floor = np.exp(-3.0 * physics.threshold_jitter)
+    floor = np.exp(-_MOST * physics.threshold_jitter)
     for i in range(rings.base[s], rings.base[s] + rings.count[s]):
         load = overload(rings, s, i)
         if load <= floor:
             continue
         lo, hi = room_to_break(rings, physics, s, i)
         if not lo <= rings.weak[i] <= hi:
-            seek_weakest(rings, physics, seed, s, i)
+            seek_weakest(rings, physics, s, i)
         if load / rings.tough[i] > most:
             most = load / rings.tough[i]
             worst = i
@@ -161,13 +151,14 @@ def tear(rings: Any, s: Any, i: Any, place: Any, fracture: Any, time: Any) -> An
     """Break the piece behind record i at a place: a fracture between two pieces (figure 6).
 
     The parts' stiffnesses follow from their own lengths, which sum to that of the piece. Returns
-    the tear, or -1 where the place would leave nothing on one side.
+    the tear, or -1 where there is nothing to part.
     """
-    place = np.round(place / GRAIN_M) * GRAIN_M
     rest = rest_of(rings, s, i)
-    part = (place - rings.place[i]) / rest
-    if not 0.0 < part < 1.0:
+    if rest < 2.0 * GRAIN_M:
         return np.int64(-1)
+    place = np.round(place / GRAIN_M) * GRAIN_M - rings.place[i]
+    place = rings.place[i] + min(max(place, GRAIN_M), rest - GRAIN_M)
+    part = (place - rings.place[i]) / rest
     end = rings.base[s] + rings.count[s]
     right = rings.left[i] + rings.open[i]
     following = rings.grip_left[i + 1] if i + 1 < end else rings.grip_left[rings.base[s]]

@@ -61,7 +61,9 @@ class Bark:
     time: float  # steps since the epidermis was whole
     history: tuple[Snapshot, ...]  # one a step, where asked for
     generation: int  # 0; 1 where the surface of another bark tore, ...
-    surface: Bark | None  # that other bark: this one's place x on the epidermis is x around its girth
+    surface: (
+        Bark | None
+    )  # that other bark: this one's place x on the epidermis is x around its girth
     _rings: Rings
     _pace: NDArray[np.float64]  # (strips) S - 1 where S is the growth ratio
 
@@ -133,6 +135,10 @@ class Bark:
                 where="trigger",
                 expected=f"a place {self.material.least_piece_m:g} m or more from the next fracture",
             )
+        # What has opened so far stays open; the strain that is left tears on.
+        rings.rest[:] = rings.open
+        rings.grip_left[:] = rings.left
+        rings.grip_right[:] = rings.left + rings.open
         where = (np.int64(strip), np.int64(record), place, self.time)
         crossings = self.geometry.crossings
         begin_fracture(rings, physics, np.int64(self.seed), crossings, *where)
@@ -294,7 +300,7 @@ def _whole(
         count=sites,
         cell=cell,
         spot=np.zeros(cell[-1], np.float32),
-        strength=np.zeros(cell[-1], np.float32),
+        drawn=np.zeros(cell[-1], np.float32),
         weakness=np.zeros(cell[-1], np.float32),
         **{name: records() for name in _RECORDS},
         tear=np.full(base[-1], -1, np.int32),
@@ -317,8 +323,8 @@ def _whole(
         rows = slice(base[s], base[s] + sites[s])
         at = np.round(np.arange(sites[s]) * (length[s] / sites[s]) / GRAIN_M) * GRAIN_M
         rings.place[rows] = at
-        rings.left[rows] = rings.grip_left[rows] = rings.grip_right[rows] = (
-            at * (girth[s] / length[s])
+        rings.left[rows] = rings.grip_left[rows] = rings.grip_right[rows] = at * (
+            girth[s] / length[s]
         )
         solve_strip(rings, physics, np.int64(s))
     return rings
@@ -357,12 +363,12 @@ def _advance(
     rings.limit[:] = pace if threshold is None else threshold - 1.0
     rings.limit[growth <= 0.0] = 0.0
     edges = _stretched(rings.edges, rings.girth, girth, spread)
-    physics = Physics.of(bark.material)
+    physics = Physics.of(bark.material, substeps)
     worst = np.zeros(len(girth))
     in_threads(stretch_all, rings, physics, girth, edges, worst)
     order = np.argsort(-worst, kind="stable")
     crossings = bark.geometry.crossings
-    tear_all(rings, physics, np.int64(bark.seed), crossings, order, worst, time)
+    tear_all(rings, physics, np.int64(bark.seed), crossings, order, time)
     return rings
 
 
@@ -545,7 +551,9 @@ def _elements(rings: Rings) -> Elements:
     first = np.concatenate([[0], np.cumsum(rings.count)])[:-1]
     record = rings.base[strip_of] + np.arange(len(strip_of)) - first[strip_of]
     record = record[rings.tear[record] >= 0]
-    strip = strip_of[rings.tear[rings.base[strip_of] + np.arange(len(strip_of)) - first[strip_of]] >= 0]
+    strip = strip_of[
+        rings.tear[rings.base[strip_of] + np.arange(len(strip_of)) - first[strip_of]] >= 0
+    ]
     torn = np.bincount(strip, minlength=n)
     offsets = np.concatenate([[0], np.cumsum(np.maximum(2 * torn, 1))]).astype(np.int64)
     # The fracture before each one around its ring: for the first, the last one a turn back.

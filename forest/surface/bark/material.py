@@ -33,7 +33,8 @@ class Material:
     fracture_stiffness: float | tuple[tuple[float, float], ...] = 20.0
     #: S, the lengthening (now / rest) at which epidermis breaks; None: the girth's growth ratio.
     threshold: float | None = None
-    #: Spread of the threshold from place to place: standard deviation of its logarithm.
+    #: Spread of the strain that grains bear: standard deviation of its logarithm. A piece is as
+    #: strong as its weakest grain.
     threshold_jitter: float = 0.3
     #: K_a, grip of the substrate, N/m3 (per metre of strip width and of epidermis); 0 slides.
     attachment: float = 0.0
@@ -53,6 +54,9 @@ class Material:
     #: Share of its threshold that the next strip must bear for a fracture to run into it; 0 is the
     #: paper's rule, by the Inglis ratio alone.
     arrest: float = 0.5
+    #: The most by which an end of a fracture runs on in one step, m: brittle bark tears at once
+    #: (the paper's rule, without limit), ductile bark slowly, so that fractures taper.
+    run_m: float = 0.05
     #: a': a fracture bends the course of others within this many times its mean width.
     influence: float = 3.0
     #: A fracture ends rather than come nearer to another than this many times its mean width.
@@ -66,8 +70,8 @@ class Material:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, (int, float)):
-                least = 0.0
-                if not math.isfinite(value) or value < least:
+                endless = field.name == "run_m" and value == math.inf
+                if not (math.isfinite(value) or endless) or value < 0.0:
                     raise _refused(field.name, value, "a number of 0 or more")
                 if field.name in positive and value <= 0.0:
                     raise _refused(field.name, value, "a number above 0")
@@ -119,14 +123,16 @@ class Physics(NamedTuple):
     flaw_m: float
     inglis: float
     arrest: float
+    run_m: float
     influence: float
     stand_off: float
     stray: float  # tangent
 
     @classmethod
-    def of(cls, material: Material) -> Physics:
-        """Take over what the kernels need."""
+    def of(cls, material: Material, substeps: int = 1) -> Physics:
+        """Take over what the kernels need in one of the parts of a step."""
         same = {name: float(getattr(material, name)) for name in cls._fields if name in _SAME}
+        same["run_m"] /= substeps
         return cls(
             **same,  # type: ignore[arg-type]
             curve_at=material.curve.at,

@@ -8,12 +8,12 @@ import numpy as np
 
 from forest._jit import njit
 from forest.random import STREAM_BARK, uniforms
-from forest.surface.bark.fracture import nearest_fracture, settle, tear, worst_piece
+from forest.surface.bark.fracture import contrast, nearest_fracture, settle, tear, worst_piece
 from forest.surface.bark.rings import overload, rest_of, turn_of, x_of
 
 _UP = np.int64(1)
 _DOWN = np.int64(-1)
-_STRAY = np.int64(3)  # what a draw is for: four ids to an axis
+_STRAY = np.int64(2)  # what a draw is for: four ids to an axis
 
 
 @njit
@@ -163,11 +163,12 @@ def _step(
         if side == 0 or gap < physics.stand_off * _mean_width(rings, other):
             return none, goes
     k, x = _piece_at(rings, to, x)
-    flawed = rings.reach[fracture] < physics.flaw_m
-    if not flawed and not overload(rings, to, k) >= physics.arrest:
-        return none, goes
     part = (x - rings.left[k] - rings.open[k]) / rings.piece[k]
     place = rings.place[k] + part * rest_of(rings, to, k)
+    grain = rings.cell[to] + np.int64(place / physics.grain_m)
+    needed = physics.arrest * contrast(rings, physics, min(grain, rings.cell[to + 1] - 1))
+    if rings.reach[fracture] >= physics.flaw_m and not overload(rings, to, k) >= needed:
+        return none, goes
     for way in (_DOWN, _UP):
         j, turns = nearest_fracture(rings, to, k, way)
         if j >= 0:
@@ -192,11 +193,13 @@ def run_on(
     runs = _UP if upper else _DOWN
     if ahead >= 0 and behind < 0 and rings.first[fracture] != rings.last[fracture]:
         runs = -runs  # it came over a passage that turned it round
+    run = 0.0
     while True:
         reach = rings.reach[fracture]
         opened = rings.area[fracture]
-        if reach >= physics.flaw_m and not reach * reach > physics.inglis * opened:
-            return
+        if reach >= physics.flaw_m:
+            if run > physics.run_m or not reach * reach > physics.inglis * opened:
+                return
         new, goes = _step(rings, physics, seed, crossings, node, runs, time)
         if new < 0:
             return
@@ -214,6 +217,7 @@ def run_on(
             rings.first[fracture] = new
         to = rings.tear_strip[new]
         rings.reach[fracture] += rings.width[to]
+        run += rings.width[to]
         settle(rings, physics, to)
         node = np.int64(new)
         runs = goes
@@ -249,9 +253,7 @@ def begin_fracture(
 
 
 @njit
-def tear_all(
-    rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, worst: Any, time: Any
-) -> None:
+def tear_all(rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, time: Any) -> None:
     """Let everything break that must, after the strips were stretched.
 
     Fractures that are there run on first: their ends bear the most. Then strips break, the most
@@ -269,10 +271,8 @@ def tear_all(
         run_on(rings, physics, seed, crossings, f, True, time)
         run_on(rings, physics, seed, crossings, f, False, time)
     for s in order:
-        if worst[s] <= np.exp(-3.0 * physics.threshold_jitter):
-            break
         while True:
-            i = worst_piece(rings, physics, seed, s)
+            i = worst_piece(rings, physics, s)
             if i < 0:
                 break
             begin_fracture(rings, physics, seed, crossings, s, i, rings.weak[i], time)

@@ -30,14 +30,16 @@ class Rings(NamedTuple):
     factor: NDArray[np.float64]  # (strips, sectors) width around the girth
     length: NDArray[np.float64]  # L0
     girth: NDArray[np.float64]  # (strips) now
-    edges: NDArray[np.float64]  # (strips, sectors + 1) where the sectors of growth end, m from the seam
+    edges: NDArray[
+        np.float64
+    ]  # (strips, sectors + 1) where the sectors of growth end, m from the seam
     limit: NDArray[np.float64]  # S - 1 in this step
     base: NDArray[np.int64]  # first record
     count: NDArray[np.int64]  # records
     cell: NDArray[np.int64]  # (strips + 1) first grain
     # one row per grain of epidermis
     spot: NDArray[np.float32]  # where in it the weakest place is, m
-    strength: NDArray[np.float32]
+    drawn: NDArray[np.float32]  # its strength, in standard deviations
     weakness: NDArray[np.float32]  # of the weakness map, 0 to 1
     # one row per record
     place: NDArray[np.float64]  # on the epidermis, m

@@ -98,12 +98,16 @@ class Elements(NamedTuple):
     start: NDArray[np.float64]  # its left edge, m around the girth from the seam; rises along a
     # strip from the first element; may be below 0 or beyond the girth (take it modulo the girth)
     width: NDArray[np.float64]  # now, m: their sum over a strip is the girth
-    rest: NDArray[np.float64]  # epidermis: its own length; fracture: its width one step ago, 0 at birth
+    rest: NDArray[
+        np.float64
+    ]  # epidermis: its own length; fracture: its width one step ago, 0 at birth
     uv0: NDArray[np.float64]  # epidermis: where on the original epidermis [0, L0) it begins, going
     # on past L0 to 0; fracture: where it was torn
     fracture: NDArray[np.int32]  # row of `Fractures`; -1 for epidermis
     tear: NDArray[np.int32]  # row of `Tears`; -1 for epidermis
-    born: NDArray[np.float64]  # time it was torn (epidermis: of the younger of its edges; 0 at first)
+    born: NDArray[
+        np.float64
+    ]  # time it was torn (epidermis: of the younger of its edges; 0 at first)
 
     def of(self, strip: int) -> Elements:
         """Give one strip's elements (views)."""
