@@ -74,7 +74,7 @@ def _lay(parent: Any, start: Any, end: Any, radius: Any, axis: Any, near: Any, n
         if p >= 0 and axis[p] == axis[i] and following[p] < 0:
             following[p] = i
             heads[i] = False
-    axes, k = 0, 0
+    axes = k = np.int64(0)
     for head in np.flatnonzero(heads):
         begin, p = k, parent[head]
         if p >= 0:  # from inside its parent
@@ -387,7 +387,7 @@ def _laid(skeleton: Skeleton, tolerance: float) -> Nodes:
         max(tolerance, _SHORTEST),
         nodes,
     )
-    return Nodes(nodes.first[: axes + 1], *(column[:k] for column in nodes[1:]))
+    return _part(nodes, nodes.first[: axes + 1], slice(0, k))
 
 
 def _thinned(nodes: Nodes, tolerance: float) -> Nodes:
@@ -395,7 +395,12 @@ def _thinned(nodes: Nodes, tolerance: float) -> Nodes:
     _thin(nodes.first, nodes.place, nodes.radius, tolerance, keep)
     _unfold(nodes.first, nodes.place, nodes.radius, keep)
     first = np.concatenate(([0], np.cumsum(keep)))[nodes.first]
-    return Nodes(first, *(np.ascontiguousarray(column[keep]) for column in nodes[1:]))
+    return _part(nodes, first, keep)
+
+
+def _part(nodes: Nodes, first: NDArray[np.int64], chosen: slice | NDArray[np.bool_]) -> Nodes:
+    _, place, radius, along, internode = nodes
+    return Nodes(first, place[chosen], radius[chosen], along[chosen], internode[chosen])
 
 
 def _number_of_sides(radius: NDArray[np.float64], tolerance: float, most: int) -> NDArray[np.int64]:
@@ -435,7 +440,7 @@ def _data(
     skeleton: Skeleton, nodes: Nodes, of_node: NDArray[np.int64]
 ) -> dict[str, NDArray[np.generic]]:
     internode = nodes.internode[of_node]
-    known = {
+    known: dict[str, NDArray[Any]] = {
         "radius_m": nodes.radius[of_node],
         "order": skeleton.order[internode],
         "birth_year": skeleton.birth_year[internode],
