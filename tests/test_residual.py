@@ -233,7 +233,7 @@ def test_without_them_nothing_is_written(tmp_path: Path) -> None:
 def test_a_file_of_ones_own_goes_into_the_run_file(tmp_path: Path) -> None:
     """The scenario is whole without the file, wherever it is read again."""
     form = load_parameters("quaking_aspen").with_changes(["1Branches=7"])
-    text = (Path(__file__).parents[1] / "forest/parametric/species/quaking_aspen.toml").read_text()
+    text = (Path(__file__).parents[1] / "forest/species/forms/quaking_aspen.toml").read_text()
     (tmp_path / "mine.toml").write_text(text.replace("branches = 50", "branches = 7"))
     table = '[[residual_trees]]\nname="a"\nx_m=1\ny_m=1\nspecies="mine.toml"\nheight_m=4\n'
     (tmp_path / "stand.toml").write_text(TOML + table)
