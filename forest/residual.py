@@ -1,7 +1,7 @@
 """Residual trees: parametric trees that stand in the stand, shade, take room and can be felled.
 
-A tree is grown from the scenario, scaled to its height and dbh, and stays as it is. Once its leaves
-are gathered into voxels and points its measures are kept and its shape is let go, for an old oak has
+A tree is grown from the scenario, scaled to its height and dbh, and stays as it is. Once it is
+gathered into voxels and points, its measures are kept and its shape is let go, since an old oak has
 a million parts; the shape is grown again where it is asked for.
 """
 

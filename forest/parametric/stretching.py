@@ -26,8 +26,8 @@ def courses(shoots: Shoots, sections: Sections, first: Any) -> tuple[Any, Any]:
 
     A clone's course begins with that of its twin; it leaves it at the node that it starts from.
     """
-    steps = np.linalg.norm(np.diff(sections.position, axis=0, prepend=sections.position[:1]), axis=1)
-    along = np.cumsum(steps)
+    places = sections.position
+    along = np.cumsum(np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=1))
     along -= along[first][sections.stem]  # from the base of each stem
     node, parent = shoots.node, shoots.parent
     begins = np.zeros(len(first))  # of a clone, along its family's course
@@ -37,6 +37,6 @@ def courses(shoots: Shoots, sections: Sections, first: Any) -> tuple[Any, Any]:
             break
         begins = found
     length = begins + along[first + shoots.nodes - 1]
-    apart = np.linalg.norm(sections.position[first] - sections.position[node], axis=1)
+    apart = np.linalg.norm(places[first] - places[node], axis=1)
     offset = np.where(parent < 0, 0.0, begins[parent] + along[node] + apart)
     return length, offset

@@ -18,7 +18,6 @@ from forest.scenario.placing import SAME_SPOT_M, Spots
 from forest.species.parametric import Parameters, load_parameters
 from forest.species.schema import Refusal, Table, quantity
 
-
 #: A trunk is no thicker than this share of its height. An old oak of the open field, 20 m high and
 #: 2 m thick, has a tenth; what has more than a quarter is a hollow pollard, or a slip of units.
 MOST_DBH_SHARE = 0.25
@@ -151,8 +150,8 @@ def check_residual(
                 key=f"{key}.like",
             )
     if trees and isinstance(planting, Explicit | Inventory):
-        for i, planted in enumerate(planting.trees):
-            other = spots.neighbour(planted.x_m, planted.y_m)
+        for i, (x, y) in enumerate([(one.x_m, one.y_m) for one in planting.trees]):
+            other = spots.neighbour(x, y)
             if other is not None:
                 raise Refusal(
                     f"stands on the spot of residual_trees[{other}]",

@@ -179,12 +179,12 @@ def _read_esri(path: Path) -> HeightField:
             raise input_error(
                 f"no {word} in the header", where=path.name, expected=f"{word} above 0"
             )
-        value = header[word]
-        whole = word == "cellsize" or value.is_integer()
-        if not (np.isfinite(value) and value > 0.0 and whole):
+        size = header[word]
+        whole = word == "cellsize" or size.is_integer()
+        if not (np.isfinite(size) and size > 0.0 and whole):
             kind = "a number" if word == "cellsize" else "a whole number"
             raise input_error(
-                f"{word} {value:g} is not allowed", where=path.name, expected=f"{kind} above 0"
+                f"{word} {size:g} is not allowed", where=path.name, expected=f"{kind} above 0"
             )
     rows, columns = int(header["nrows"]), int(header["ncols"])
     if len(values) != rows * columns:

@@ -197,7 +197,7 @@ def test_shipped_species_grow(name: str) -> None:
         ("0Length=0", "no length"),
         (
             "0CurveRes=1",
-            "base_splits: the trunk is one segment, and splits where its first two meet; expected 0",
+            "base_splits: the trunk is one segment, and splits where its first two meet; expected",
         ),
         ("Scale", "changes nothing"),
     ],
