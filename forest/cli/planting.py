@@ -54,10 +54,10 @@ def tree(
     given = _given(context)
     if list_ or species is None:
         if given or (list_ and species is not None):
-            what = f"--{given[0].replace('_', '-')}" if given else species
+            needs = f"--{given[0].replace('_', '-')} needs a species" if given else ""
             raise InputError(
-                f"{what} asks nothing of the list of species",
-                expected="forest tree SPECIES with it, or forest tree --list alone",
+                needs or "--list takes no species",
+                expected="forest tree SPECIES with options, or forest tree --list alone",
             )
         for name in parametric_names():
             typer.echo(f"{name:<22} {load_parameters(name).common_name}")
