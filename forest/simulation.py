@@ -174,7 +174,10 @@ def _create(
         seed=scenario.seed,
         species_names=[s.name for s in scenario.species_list],
         threads=threads,
-        tables=scenario.output.tables,
+        residual=[(tree.name, tree.species) for tree in scenario.residual_trees],
+        tables=[
+            name for name in scenario.output.tables if name != "residual" or scenario.residual_trees
+        ],
         trees_per_year=max(n, 1),
         command=command,
         overwrite=overwrite,

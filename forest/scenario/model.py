@@ -31,6 +31,7 @@ _TableName = Literal[
     "regeneration",
     "treatments",
     "storms",
+    "residual",
 ]
 
 
@@ -377,7 +378,8 @@ class Output(Table):
         get_args(_TableName),
         "tables to write; stability only has rows where there is a table mechanics, deadwood "
         "where there are snags, regeneration where there is a table of that name, treatments "
-        "where there are acts, storms where the wind blew",
+        "where there are acts, storms where the wind blew; residual is written where there are "
+        "residual trees",
         unit="",
         max_length=len(get_args(_TableName)),
     )
