@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.benchmarks import bending, costs, frames, machine, parametric, report, runs, stands
+from tests.benchmarks import bark, bending, costs, frames, machine, parametric, report, runs, stands
 
 
 class Extent(NamedTuple):
@@ -76,6 +76,7 @@ def measure(extent: Extent) -> dict[str, Any]:
         extent.frame_trees,
         extent.repeats,
     )
+    result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")

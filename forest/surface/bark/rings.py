@@ -19,7 +19,7 @@ CHUNKS = 64  # of strips; fixed, so that results do not depend on the number of 
 
 
 class Rings(NamedTuple):
-    """Strips, records, tears and fractures as growable columns (76 bytes a record, 28 a tear)."""
+    """Strips, records (76 bytes), tears (32) and fractures (28) as columns that kernels change."""
 
     # one row per strip
     axis: NDArray[np.int32]
