@@ -116,7 +116,7 @@ class StandView:
         colour = hazed(blades.colour.reshape(-1, 3) / 255.0, points, camera, scenery)
         distance = np.linalg.norm(blades.vertices[:, 0] - np.asarray(camera.eye), axis=1)
         width = _BLADE_WIDTH_M * _pixels_per_metre(camera) / np.maximum(distance, _NEAR_M)
-        for size, here in _by_size(width):
+        for size, here in _by_size(width, blades.vertices, 1):
             pv = import_pyvista()
             mesh = pv.PolyData()
             mesh.points = blades.vertices[here].reshape(-1, 3)
@@ -268,7 +268,7 @@ def _add_triangles(plotter: Any, frame: Frame, part: slice) -> None:
 
 
 def _add_lines(plotter: Any, frame: Frame, part: slice) -> None:
-    for size, here in _by_size(OVERSAMPLING * frame.line_width[part]):
+    for size, here in _by_size(OVERSAMPLING * frame.line_width[part], frame.lines[part], 1):
         corners = frame.lines[part][here]
         mesh = import_pyvista().PolyData()
         mesh.points = corners.reshape(-1, 3)
@@ -278,7 +278,7 @@ def _add_lines(plotter: Any, frame: Frame, part: slice) -> None:
 
 
 def _add_points(plotter: Any, frame: Frame, part: slice) -> None:
-    for size, here in _by_size(OVERSAMPLING * frame.point_size[part]):
+    for size, here in _by_size(OVERSAMPLING * frame.point_size[part], frame.points[part], 2):
         corners = frame.points[part][here]
         mesh = import_pyvista().PolyData()
         mesh.points = corners
@@ -301,8 +301,7 @@ def _grained(
 
     Leaves differ, and those of a crown's shady side would else be one even patch.
     """
-    x, y, z = vertices.reshape(len(vertices), -1)[:, :3].T
-    chance = np.modf(np.abs(np.sin(x * 12.9898 + y * 78.233 + z * 37.719)) * 4375.85)[0]
+    chance = _chance(vertices, 12.9898)
     grained = colour * (1.0 + grain * (2.0 * chance[:, None] - 1.0))
     return np.asarray(np.clip(grained, 0.0, 255.0), np.uint8)
 
@@ -313,8 +312,24 @@ def _cells(count: int, corners: int) -> NDArray[np.int64]:
     return np.column_stack((np.full(count, corners), index)).ravel()
 
 
-def _by_size(wanted: NDArray[Any]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Sort things into whole widths of fine pixels, for VTK draws one width at a time."""
-    size = np.clip(np.round(wanted), 1, _WIDEST_PX).astype(np.int64)
-    for one in np.unique(size):
+def _chance(vertices: NDArray[np.float32], number: float) -> NDArray[Any]:
+    """Give numbers (n,) from 0 to 1 that look random, by where first corners stand."""
+    x, y, z = vertices.reshape(len(vertices), -1)[:, :3].T
+    return np.modf(np.abs(np.sin(x * number + y * 78.233 + z * 37.719)) * 4375.85)[0]
+
+
+def _by_size(
+    wanted: NDArray[Any], vertices: NDArray[np.float32], power: int
+) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    """Sort things into whole widths of fine pixels, for VTK draws one width at a time.
+
+    Each gets the next lower or higher one, so often that the mean of their power is right: trees
+    do not jump from one width to the other.
+    """
+    least = np.clip(np.floor(wanted), 1, _WIDEST_PX)
+    share = (np.clip(wanted, 1, _WIDEST_PX) ** power - least**power) / (
+        (least + 1) ** power - least**power
+    )
+    size = (least + (_chance(vertices, 24.3137) < share)).astype(np.int64)
+    for one in np.flatnonzero(np.bincount(size)):
         yield int(one), np.flatnonzero(size == one)
