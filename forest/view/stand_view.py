@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -314,7 +315,7 @@ def _cells(count: int, corners: int) -> NDArray[np.int64]:
 
 def _chance(vertices: NDArray[np.float32], number: float) -> NDArray[Any]:
     """Give numbers (n,) from 0 to 1 that look random, by where first corners stand."""
-    x, y, z = vertices.reshape(len(vertices), -1)[:, :3].T
+    x, y, z = vertices.reshape(len(vertices), prod(vertices.shape[1:]))[:, :3].T
     return np.modf(np.abs(np.sin(x * number + y * 78.233 + z * 37.719)) * 4375.85)[0]
 
 

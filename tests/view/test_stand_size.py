@@ -117,3 +117,20 @@ def test_trees_without_room_are_told(tmp_path: Path) -> None:
     found = len(scenery.instances.model)
     assert found < 10
     assert scenery.notes == (f"trees[0]: {40 - found} of 40 found no room 9 m from each other",)
+
+
+def test_from_above_the_grass_no_blade_is_in_reach() -> None:
+    text = "[camera]\nsize_px = [60, 40]\neye_m = [5, -8, 90]\ntowards_m = [5, 5, 2]\n[[grass]]\n"
+    assert StandView(build_scenery(SceneFile.from_toml(text))).picture().std() > 1.0
+
+
+def test_widths_between_whole_pixels_are_mixed() -> None:
+    place = np.random.default_rng(1).uniform(0.0, 50.0, (20_000, 3)).astype(np.float32)
+    wanted = np.full(len(place), 1.6, np.float32)
+    for power in (1, 2):
+        found = {size: len(here) for size, here in stand_view._by_size(wanted, place, power)}
+        assert set(found) == {1, 2}
+        mean = sum(size**power * number for size, number in found.items()) / len(place)
+        assert mean == pytest.approx(1.6**power, rel=0.02)
+    wide = dict(stand_view._by_size(np.array([0.2, 99.0]), place[:2], 2))
+    assert set(wide) == {1, 8}
