@@ -47,7 +47,7 @@ PICTURES: dict[str, Callable[[], Scenery]] = {
     "valley_fall": lambda: valley(
         "fall",
         haze=Haze(350.0),
-        view=Viewpoint((200.0, -60.0, 50.0), (200.0, 150.0, 0.0)),
+        view=Viewpoint((200.0, 30.0, 50.0), (205.0, 190.0, 0.0)),
     ),
     "valley_winter": lambda: valley("winter", sun_elevation_deg=22.0),
     "stand_view": spruce_stand,

@@ -316,7 +316,8 @@ def _cells(count: int, corners: int) -> NDArray[np.int64]:
 def _chance(vertices: NDArray[np.float32], number: float) -> NDArray[Any]:
     """Give numbers (n,) from 0 to 1 that look random, by where first corners stand."""
     x, y, z = vertices.reshape(len(vertices), prod(vertices.shape[1:]))[:, :3].T
-    return np.modf(np.abs(np.sin(x * number + y * 78.233 + z * 37.719)) * 4375.85)[0]
+    wave = np.abs(np.sin(x * number + y * 78.233 + z * 37.719)) * 4375.85
+    return np.asarray(np.modf(wave)[0])
 
 
 def _by_size(
