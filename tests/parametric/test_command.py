@@ -122,6 +122,11 @@ def test_species_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         (["lilac", "--quality", "0"], "quality 0 is not allowed"),
         (["lilac", "--wind", "nan"], "wind speed nan is not allowed"),
         (["lilac", "--to", "still.gif"], "nothing moves"),
+        (["--to", "x.png"], "--to needs a species; expected forest tree SPECIES"),
+        (["--list", "--time-scale", "2"], "--time-scale needs a species"),
+        (["--list", "lilac"], "--list takes no species"),
+        (["lilac", "--frames", "2", "--to", "z.png"], "--frames is for a .gif; expected --to NAME"),
+        (["lilac", "--seconds", "4"], "--seconds is for a .gif"),
     ],
 )
 def test_refused(words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from forest.errors import InputError
 from forest.parametric import Parameters, load_parameters
 from forest.record.run import Run
-from forest.residual import ResidualTree, grow_residual
+from forest.residual import GrownResidual, grow_residual
 from forest.species import Species
 from forest.surface.grass import GRASSES
 from forest.surface.instances import Instances, Model
@@ -41,6 +41,7 @@ _STAND_IN_SEEDS = 3
 _MOST_LEAVES = 20_000
 #: Of a residual tree, which is single and often near.
 MOST_RESIDUAL_LEAVES = 200_000
+_ALL_RESIDUAL_LEAVES = 4_000_000  # of all of them together
 #: Trees of a view at most, those of all repeats together.
 MOST_TILED = 200_000
 #: Shapes of a species that are kept at most; other trees take the one that is nearest in height.
@@ -255,6 +256,7 @@ def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.
     rows = run.read("residual", years=(year, year))
     rows = rows[rows["status"] == "standing"]
     number = []
+    most = min(MOST_RESIDUAL_LEAVES, _ALL_RESIDUAL_LEAVES // max(len(rows), 1))
     for one in rows["residual_id"]:
         wanted = run.scenario.residual_trees[one - 1]
         assert wanted.parameters is not None  # filled in when the scenario was read
@@ -262,22 +264,24 @@ def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.
         number.append(
             stock.number(
                 ("residual", one),
-                lambda t=tree, p=wanted.parameters: residual_model(t, p),  # type: ignore[misc]
+                lambda t=tree, p=wanted.parameters: residual_model(t, p, most),  # type: ignore[misc]
             )
         )
     return np.array(number, np.int64), rows
 
 
-def residual_model(tree: ResidualTree, parameters: Parameters) -> tuple[Model, float]:
+def residual_model(
+    tree: GrownResidual, parameters: Parameters, most_leaves: int
+) -> tuple[Model, float]:
     """Make the model of a residual tree as it stands in the run, and give its height, m.
 
     Its stems have its own radii, its leaves its leaf area in all; of more than
-    `MOST_RESIDUAL_LEAVES` every so-manieth is drawn, larger.
+    `most_leaves` every so-manieth is drawn, larger.
     """
     bark, foliage = parametric_colours(parameters)
     model = Model.of(
         tree.skeleton,
-        _fewer(tree.leaves, MOST_RESIDUAL_LEAVES),
+        _fewer(tree.leaves, most_leaves),
         evergreen=parameters.evergreen,
         bark=bark,
         foliage=foliage,
