@@ -62,8 +62,10 @@ def lit(
     )
     open_to_sky = maps.occlusion[row, column] / 255.0
     # Light that grazes the uncracked surface does not reach the ground of fractures.
-    direct = np.clip(normal @ light, 0.0, None) * np.clip(3.0 * (frame[..., 2, :] @ light), 0.0, 1.0)
-    half = light + [0.0, 0.0, 1.0]
+    direct = np.clip(normal @ light, 0.0, None) * np.clip(
+        3.0 * (frame[..., 2, :] @ light), 0.0, 1.0
+    )
+    half = light + np.array([0.0, 0.0, 1.0])
     half /= np.linalg.norm(half)
     rough = maps.roughness[row, column] / 255.0
     shine = 0.25 * (1.0 - rough) * np.clip(normal @ half, 0.0, 1.0) ** (4.0 / rough**3)
@@ -104,9 +106,7 @@ def _shaped(
     return around, ball_m * np.arcsin(np.clip(y / ball_m, -1.0, 1.0)), frame, seen
 
 
-def _pixel(
-    maps: BarkMaps, u: _Floats, v: _Floats
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _pixel(maps: BarkMaps, u: _Floats, v: _Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows and columns of the maps at places (m) from the middle of their seam and height."""
     rows, columns = maps.occlusion.shape
     column = np.floor((u / maps.width_m + 0.5) * columns).astype(np.int64) % columns

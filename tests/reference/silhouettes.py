@@ -1,4 +1,4 @@
-"""What lies at one point of bark, piece by piece: the slow twin of `forest.surface.bark.outlines`."""
+"""What lies at one point of bark: the slow twin of `forest.surface.bark.outlines`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ def _steep(ends: list[float], s: float) -> float:
     return (_cubic(ends, s + h) - _cubic(ends, s - h)) / (2 * h)
 
 
-def _wave(relief: Relief, fracture: int, side: int, v: float, spacing: float, periods: int) -> float:
+def _wave(
+    relief: Relief, fracture: int, side: int, v: float, spacing: float, periods: int
+) -> float:
     total = 0.0
     for octave in range(3):
         at = v / spacing * 2**octave
@@ -77,6 +79,7 @@ def field_at(
     shoulder = relief.shoulder[0]
     hit = [one for one in openings if one[1] > turn]
     if hit:
+
         def sunk(one: tuple[float, float, list[float], float, float]) -> float:
             left, right, _, _, full = one
             way = min(min(turn - left, right - turn) / (0.5 * (right - left)), 1.0)

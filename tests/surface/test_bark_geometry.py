@@ -39,7 +39,9 @@ def test_a_whole_turn_is_a_closed_tube(name: str) -> None:
     assert mesh.components().max() == 0
     torn = (bark.elements.width * (bark.elements.kind == 1)).sum() / bark.elements.width.sum()
     assert area[made.material == 1].sum() / area.sum() == pytest.approx(torn, rel=0.06)
-    outward = np.einsum("ij,ij->i", mesh.face_normals()[:, :2], mesh.points[mesh.triangles[:, 0], :2])
+    outward = np.einsum(
+        "ij,ij->i", mesh.face_normals()[:, :2], mesh.points[mesh.triangles[:, 0], :2]
+    )
     assert (outward > 0).mean() > 0.8
 
 

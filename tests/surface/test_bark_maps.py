@@ -187,7 +187,10 @@ def test_lichen_and_folds_are_options(dresses: dict[str, Dress]) -> None:
     without = small(plain._replace(preset=plain.preset.model_copy(update={"lichen": none})))
     grown = small(plain._replace(preset=plain.preset.model_copy(update={"lichen": much})))
     changed = (without.colour != grown.colour).any(axis=-1)
-    moist, dry = changed[:, 25:75].mean(), changed[:, 125:175].mean()  # a quarter turn from the seam
+    moist, dry = (
+        changed[:, 25:75].mean(),
+        changed[:, 125:175].mean(),
+    )  # a quarter turn from the seam
     assert moist > 0.3 > 0.05 > dry
     folded = small(plain, folds=[Fold(0.5, 0.2, 0.04, 0.02)])
     raised = folded.height_m - small(plain).height_m

@@ -141,7 +141,9 @@ def bark_geometry(
     points, edges = _welded(points, edges + len(frame))
     corner = np.array([[turns[0] * girth, low], [turns[1] * girth, high]])
     triangles = _sound_triangles(points, edges, corner)
-    return _raised(bark, preset, surface, outlines, points / [girth, 1.0], triangles, girth_m, turns)
+    return _raised(
+        bark, preset, surface, outlines, points / [girth, 1.0], triangles, girth_m, turns
+    )
 
 
 def _lines(
@@ -294,7 +296,7 @@ def _triangulate(points: _Floats, edges: _Edges) -> NDArray[np.int64]:
     a, b, c = (points[triangles[:, k]] for k in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     triangles[area < 0.0] = triangles[area < 0.0][:, ::-1]
-    return triangles[area != 0.0]
+    return np.asarray(triangles[area != 0.0], np.int64)
 
 
 def _raised(
