@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tests.benchmarks import (
+    bark,
     bending,
     costs,
     frames,
@@ -87,6 +88,7 @@ def measure(extent: Extent) -> dict[str, Any]:
         extent.repeats,
     )
     result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
+    result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
