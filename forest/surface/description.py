@@ -87,12 +87,15 @@ class Description:
         Trunk, main branches and all other branches, in order of creation.
     leaves : Leaves
         In order of creation.
+    skeleton : Skeleton
+        The tree that it was made of.
     lobes : (int, float)
         Number of peaks around the trunk, and their height as a share of its radius.
     """
 
     stems: tuple[Segments, ...]
     leaves: Leaves
+    skeleton: Skeleton
     lobes: tuple[int, float] = (0, 0.0)
 
     def drawn(self, shares: Fractions) -> Drawing:
@@ -160,7 +163,7 @@ def describe(
     stems = tuple(
         Segments(*(field[by_axis[level == k]] for field in whole)) for k in range(LAST_LEVEL + 1)
     )
-    return Description(stems, leaves, lobes)
+    return Description(stems, leaves, skeleton, lobes)
 
 
 def _tubes(

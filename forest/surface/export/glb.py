@@ -40,13 +40,13 @@ def write_glb(parts: Sequence[Part], draft: Path) -> None:
     `Mesh.data` become attributes of the points, ``_RADIUS_M`` and so on, as floats: glTF knows no
     integers of 32 bits there. Points are doubled at seams of the texture coordinates.
     """
-    file = _File()
+    file = GltfFile()
     for part in parts:
         file.add(part)
     file.save(draft)
 
 
-class _File:
+class GltfFile:
     """A glTF file in the making."""
 
     def __init__(self) -> None:

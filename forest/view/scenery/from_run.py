@@ -14,6 +14,7 @@ from forest.record.run import Run
 from forest.species import Species
 from forest.surface.grass import GRASSES
 from forest.surface.instances import Instances, Model
+from forest.surface.scene import Census
 from forest.surface.terrain import HeightField
 from forest.trees.leaves import leaves_of
 from forest.trees.skeleton import Skeleton
@@ -23,6 +24,9 @@ from forest.view.scenery.scenery import Scenery
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from forest.scenario import Scenario
+    from forest.stand import Stand
 
 #: Parametric species that stand in for simulated ones of which no shape is on record.
 STAND_INS: Mapping[str, str] = {
@@ -41,6 +45,7 @@ _MOST_LEAVES = 20_000
 #: Shapes of a species that are kept at most; other trees take the one that is nearest in height.
 MOST_SHAPES = 60
 
+_RESIDUAL_COLUMNS = ["residual_id", "x_m", "y_m", "height_m", "dbh_cm"]
 _LITTER = (0.42, 0.33, 0.21)
 _LEAVES_PER_SITE = 3  # that share its area; a single one would be as large as a hand
 
@@ -103,11 +108,66 @@ def scenery_of_run(
         If there is no table of trees, or the year is not on record.
     """
     year = _year(run, year)
-    columns = ["tree_id", "species", "x_m", "y_m", "height_m", "status"]
+    columns = ["tree_id", "species", "x_m", "y_m", "height_m", "dbh_cm", "status"]
     trees = run.read("trees", columns, years=(year, year))
-    trees = trees[(trees["status"] == "living") & (trees["height_m"] > 0.0)]
+    found = {
+        tree_id: run.skeleton(tree_id, year)
+        for tree_id in run.samples
+        if year in run.sample_years(tree_id)
+    }
+    return _put_up(
+        run.scenario,
+        year,
+        trees[trees["status"] == "living"],
+        (found, shapes),
+        _residual_rows(run, year),
+        tile=tile,
+        grass=grass,
+    )
+
+
+def scenery_of_stand(
+    stand: Stand, *, tile: int = 1, grass: str | None = "meadow"
+) -> Scenery:
+    """Put up the trees of a stand as it stands, like `scenery_of_run` those of a year."""
+    import pandas as pd
+
+    residual = pd.DataFrame(
+        [
+            (-tree.skeleton.tree_id, *tree.skeleton.start[0, :2], tree.height_m, tree.dbh_cm)
+            for tree in stand.residual
+        ],
+        columns=_RESIDUAL_COLUMNS,
+    )
+    return _put_up(
+        stand.scenario,
+        stand.year,
+        stand.trees,
+        ({}, (stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id)),
+        residual,
+        tile=tile,
+        grass=grass,
+    )
+
+
+def _put_up(
+    scenario: Scenario,
+    year: int,
+    trees: pd.DataFrame,
+    shapes: tuple[dict[int, Skeleton], Iterable[Skeleton]],
+    residual: pd.DataFrame,
+    *,
+    tile: int,
+    grass: str | None,
+) -> Scenery:
+    """Give every tree a model: its own, one of its species, or a stand-in.
+
+    Of `shapes`, those of sample trees all become models, of the others no more than `MOST_SHAPES`
+    of a species.
+    """
+    trees = trees[trees["height_m"] > 0.0]
     stock = Stock()
-    known = _shapes_on_record(run, year, shapes, stock)
+    known = _shapes_on_record(scenario, *shapes, stock)
     names = trees["species"].astype(str).to_numpy()
     ids, heights = trees["tree_id"].to_numpy(), trees["height_m"].to_numpy(np.float64)
     model = np.zeros(len(trees), np.int64)
@@ -121,16 +181,15 @@ def scenery_of_run(
             model[k], as_it_is[k] = best.model, best.tree_id == ids[k]
         else:
             seed = int(ids[k]) % _STAND_IN_SEEDS
-            model[k] = _stand_in(name, seed, run.scenario.species[name].group, stock)
+            model[k] = _stand_in(name, seed, scenario.species[name].group, stock)
             stand_in += 1
-    model_of_residual, residual = _residual(run, year, stock)
-    model = np.concatenate((model, model_of_residual))
+    model = np.concatenate((model, _residual_models(scenario, residual, stock)))
     heights = np.concatenate((heights, residual["height_m"].to_numpy(np.float64)))
     as_it_is = np.concatenate((as_it_is, np.zeros(len(residual), np.bool_)))
     spots = np.concatenate([t[["x_m", "y_m"]].to_numpy(np.float64) for t in (trees, residual)])
     sizes = np.array(stock.heights)
     scale = np.where(as_it_is, 1.0, heights / sizes[model]) if len(model) else np.empty(0)
-    width, depth = run.scenario.plot.size_m
+    width, depth = scenario.plot.size_m
     shift = (np.arange(tile) - tile // 2).astype(np.float64)
     places = [
         np.column_stack((spots[:, 0] + i * width, spots[:, 1] + j * depth, np.zeros(len(spots))))
@@ -150,6 +209,7 @@ def scenery_of_run(
         grasses={1: GRASSES[grass]} if grass else {},
         grass_at=_grass_around(extent),
         ground=_LITTER,
+        census=_census(scenario, trees, residual, tile),
         notes=_told(year, as_it_is, stand_in, names, tile),
     )
 
@@ -179,16 +239,11 @@ def _year(run: Run, year: int | None) -> int:
 
 
 def _shapes_on_record(
-    run: Run, year: int, shapes: Iterable[Skeleton], stock: Stock
+    scenario: Scenario, found: dict[int, Skeleton], more: Iterable[Skeleton], stock: Stock
 ) -> dict[str, list[_Shape]]:
     """Make models of the shapes of that year, for each species evenly over the heights."""
-    found = {
-        tree_id: run.skeleton(tree_id, year)
-        for tree_id in run.samples
-        if year in run.sample_years(tree_id)
-    }
     samples = set(found)
-    for skeleton in shapes:
+    for skeleton in more:
         found.setdefault(skeleton.tree_id, skeleton)
     by_species: dict[str, list[Skeleton]] = {}
     for skeleton in sorted(found.values(), key=lambda s: float(s.end[:, 2].max())):
@@ -200,7 +255,7 @@ def _shapes_on_record(
         for skeleton in kept:
             number = stock.number(
                 skeleton.tree_id,
-                lambda s=skeleton: simulated_model(s, run.scenario.species),  # type: ignore[misc]
+                lambda s=skeleton: simulated_model(s, scenario.species),  # type: ignore[misc]
             )
             known.setdefault(name, []).append(
                 _Shape(stock.heights[number], number, skeleton.tree_id)
@@ -208,17 +263,23 @@ def _shapes_on_record(
     return known
 
 
-def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.DataFrame]:
-    """Give the models of the residual trees that stand in a year, and their rows of `/residual`."""
+def _residual_rows(run: Run, year: int) -> pd.DataFrame:
+    """Read the rows of the residual trees that stand in a year."""
     import pandas as pd
 
     if "residual" not in run.tables:
-        return np.empty(0, np.int64), pd.DataFrame(columns=["x_m", "y_m", "height_m"])
+        return pd.DataFrame(columns=_RESIDUAL_COLUMNS)
     rows = run.read("residual", years=(year, year))
-    rows = rows[rows["status"] == "standing"]
+    return rows[rows["status"] == "standing"]
+
+
+def _residual_models(
+    scenario: Scenario, residual: pd.DataFrame, stock: Stock
+) -> NDArray[np.int64]:
+    """Give the models of residual trees."""
     number = []
-    for one in rows["residual_id"]:
-        tree = run.scenario.residual_trees[one - 1]
+    for one in residual["residual_id"]:
+        tree = scenario.residual_trees[one - 1]
         assert tree.parameters is not None  # filled in when the scenario was read
         parameters, seed = tree.parameters, tree.seed
         number.append(
@@ -229,7 +290,21 @@ def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.
                 ),
             )
         )
-    return np.array(number, np.int64), rows
+    return np.array(number, np.int64)
+
+
+def _census(
+    scenario: Scenario, trees: pd.DataFrame, residual: pd.DataFrame, tile: int
+) -> Census:
+    """Tell who the trees are, those of each plot in turn."""
+    ids = [trees["tree_id"], -residual["residual_id"]]
+    of_residual = [scenario.residual_trees[k - 1].species for k in residual["residual_id"]]
+    dbh = [table["dbh_cm"].to_numpy(np.float64) for table in (trees, residual)]
+    return Census(
+        np.tile(np.concatenate(ids).astype(np.int64), tile**2),
+        np.tile(np.array([*trees["species"].astype(str), *of_residual], np.str_), tile**2),
+        np.tile(np.concatenate(dbh), tile**2),
+    )
 
 
 def _stand_in(species: str, seed: int, group: str, stock: Stock) -> int:

@@ -13,6 +13,7 @@ from forest.errors import InputError
 from forest.surface.camera import Camera
 from forest.surface.grass import Grass
 from forest.surface.instances import Instances, Model
+from forest.surface.scene import Census
 from forest.surface.terrain import HeightField
 
 RGB = tuple[float, float, float]
@@ -79,6 +80,8 @@ class Scenery:
         The ground that is the scene's own, m; beyond it the ground only goes on.
     sun_azimuth_deg, sun_elevation_deg : float
         From north clockwise, and above the horizon.
+    census : Census, optional
+        Who the trees are, where they have names of their own.
     notes : tuple of str
         What a user should know of how it was made, a line each.
     """
@@ -99,6 +102,7 @@ class Scenery:
     view: Viewpoint = Viewpoint()
     size: tuple[int, int] = (1200, 750)
     seed: int = 1
+    census: Census | None = None
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
