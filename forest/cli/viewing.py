@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forest.cli.shared import check_targets, last_shapes
+from forest.cli.shared import check_targets, shapes_of_year
 
 if TYPE_CHECKING:
     from forest.view.scenery import Scenery
@@ -103,20 +103,11 @@ def _of_file(scene: Path) -> Scenery:
 
 def _of_run(path: Path, year: int | None, tile: int) -> Scenery:
     """Read a year of a run; if its checkpoint is of that year, every tree has its own shape."""
-    from forest.record.checkpoint import checkpoint_paths
     from forest.record.run import open_run
     from forest.view.scenery import scenery_of_run
 
     with open_run(path) as run:
-        shapes: list[Any] = []
-        if len(run.years):
-            wanted = int(run.years[-1]) if year is None else year
-            name = f".checkpoint-{wanted - run.scenario.start_year + 1:06d}.npz"
-            kept = checkpoint_paths(path)
-            if kept and kept[-1].name.endswith(name):
-                at, found = last_shapes(path, run.scenario)
-                shapes = [s for s in found if s.tree_id > 0] if at == wanted else []
-        return scenery_of_run(run, year, shapes=shapes, tile=tile)
+        return scenery_of_run(run, year, shapes=shapes_of_year(path, run, year), tile=tile)
 
 
 def _changed(

@@ -29,6 +29,7 @@ DETAILS = {"tree": 20.0, "stand": 100.0, "far": 400.0}
 
 _TOLERANCE = 1e-4  # of the surface of wood, over the range; about a tenth of a pixel
 _MOST_SIDES = 24
+_SHAPES_A_LINE = 50  # of progress
 _MOST_GROUND_CELLS = 200  # along each edge
 
 _Say = Callable[[str], object]
@@ -204,7 +205,7 @@ def build_scene(
                 model.foliage[sight.season],
             )
         )
-        if number % 20 == 0 or number == len(models):
+        if number % _SHAPES_A_LINE == 0 or number == len(models):
             say(f"{number} of {len(models)} shapes")
     if census is None:
         names = np.array([shape.species for shape in shapes])[instances.model]
@@ -234,9 +235,7 @@ def ground_of(
     return Ground(Mesh(points, triangles, points[triangles][:, :, :2]), colour)
 
 
-def _wood(
-    skeleton: Skeleton, shares: Fractions, range_m: float, lobes: tuple[int, float]
-) -> Mesh:
+def _wood(skeleton: Skeleton, shares: Fractions, range_m: float, lobes: tuple[int, float]) -> Mesh:
     """Lay tubes along the axes that are drawn as tubes or as lines."""
     share = np.maximum(shares.stem_polygons, shares.stem_lines)
     return tubes(
@@ -291,7 +290,7 @@ def _foliage(leaves: Leaves, shares: Fractions) -> Leaves:
     if shares.leaf_points > 0.0:
         share = max(share, 1.0 / LEAF_POINT_MASS)
     chosen = drawn(len(leaves.shape), share, LEAF_POINT_MASS)
-    few = Leaves(*(column[chosen] for column in leaves))
+    few = Leaves._make(column[chosen] for column in leaves)
     if not len(chosen):
         return few
     larger = np.sqrt(leaves.area.sum() / few.area.sum())

@@ -14,7 +14,8 @@ from forest.surface.scene import Scene
 from forest.view.scene import import_pyvista, look_at, open_plotter, save
 from forest.view.shading import SUN
 
-_AMBIENT, _SUN, _SKY = 0.25, 0.75, 0.45
+_AMBIENT, _SUN, _SKY = 0.3, 0.8, 0.45
+_THROUGH = 0.5  # light that comes through leaves, so that they are not black from below
 _SKY_COLOUR = "#dfe8ef"
 _Say = Callable[[str], object]
 
@@ -51,9 +52,7 @@ def draw_scene(
         plotter.set_background(_SKY_COLOUR)
         plotter.remove_all_lights()
         for way, strength in ((SUN, _SUN), (np.array([0.0, 0.0, 1.0]), _SKY)):
-            light = pv.Light(
-                position=tuple(way), focal_point=(0, 0, 0), intensity=strength, light_type="scenelight"
-            )
+            light = pv.Light(position=tuple(way), intensity=strength, light_type="scenelight")
             plotter.add_light(light)
         if scene.ground is not None:
             ground = pv.PolyData(*wood_cells(scene.ground.mesh))
@@ -80,7 +79,7 @@ def draw_scene(
 
 def _add_shape(plotter: Any, scene: Scene, number: int) -> None:
     """Let the renderer repeat a shape's wood and leaves at the places of its trees."""
-    import vtk
+    from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper
 
     pv = import_pyvista()
     shape, here = scene.shapes[number], scene.instances.model == number
@@ -88,19 +87,19 @@ def _add_shape(plotter: Any, scene: Scene, number: int) -> None:
         return
     places = pv.PolyData(scene.instances.place[here])
     places.point_data["scale"] = scene.instances.scale[here]
-    parts = [(wood_cells(shape.wood), shape.bark)]
-    parts += [(cells, shape.foliage) for cells in leaf_cells(shape.leaves)]
-    for (points, cells), colour in parts:
-        mapper = vtk.vtkGlyph3DMapper()
+    parts = [(wood_cells(shape.wood), shape.bark, _AMBIENT)]
+    parts += [(cells, shape.foliage, _THROUGH) for cells in leaf_cells(shape.leaves)]
+    for (points, cells), colour, ambient in parts:
+        mapper = vtkGlyph3DMapper()
         mapper.SetInputData(places)
         mapper.SetSourceData(pv.PolyData(points.astype(np.float32), cells))
         mapper.SetScaleArray("scale")
         mapper.SetScaleModeToScaleByMagnitude()
         mapper.OrientOff()
         mapper.ScalarVisibilityOff()
-        actor = vtk.vtkActor()
+        actor = vtkActor()
         actor.SetMapper(mapper)
         look = actor.GetProperty()
         look.SetColor(*colour)
-        look.SetAmbient(_AMBIENT)
+        look.SetAmbient(ambient)
         plotter.add_actor(actor, reset_camera=False, render=False)

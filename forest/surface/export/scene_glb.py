@@ -58,7 +58,7 @@ def write_scene_glb(
         file.add_ground()
     for number, shape in enumerate(scene.shapes):
         file.add_shape(shape)
-        if (number + 1) % 20 == 0 or number + 1 == len(scene.shapes):
+        if (number + 1) % 50 == 0 or number + 1 == len(scene.shapes):
             say(f"{number + 1} of {len(scene.shapes)} shapes in the file")
     file.add_trees()
     file.save(draft)
@@ -96,7 +96,7 @@ class _SceneFile(GltfFile):
         carriers = []
         for code in np.unique(shape.leaves.shape).tolist():
             here = shape.leaves.shape == code
-            leaves = Leaves(*(column[here] for column in shape.leaves))
+            leaves = Leaves._make(column[here] for column in shape.leaves)
             material = self._leafy(shape, code)
             if self._instanced:
                 carriers.append((self._card(material), self._transforms(leaves)))

@@ -97,7 +97,7 @@ def leaf_cells(leaves: Leaves) -> Iterator[_Piece]:
     for code in np.unique(leaves.shape).tolist():
         here = leaves.shape == code
         outline = OUTLINES[code] * (1.0, -1.0)  # anticlockwise from above
-        corners = card_corners(Leaves(*(column[here] for column in leaves)), outline)
+        corners = card_corners(Leaves._make(column[here] for column in leaves), outline)
         n, k = corners.shape[:2]
         cells = np.column_stack((np.full(n, k), np.arange(n * k).reshape(n, k))).ravel()
         yield corners.reshape(-1, 3), cells

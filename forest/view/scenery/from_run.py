@@ -126,9 +126,7 @@ def scenery_of_run(
     )
 
 
-def scenery_of_stand(
-    stand: Stand, *, tile: int = 1, grass: str | None = "meadow"
-) -> Scenery:
+def scenery_of_stand(stand: Stand, *, tile: int = 1, grass: str | None = "meadow") -> Scenery:
     """Put up the trees of a stand as it stands, like `scenery_of_run` those of a year."""
     import pandas as pd
 
@@ -273,9 +271,7 @@ def _residual_rows(run: Run, year: int) -> pd.DataFrame:
     return rows[rows["status"] == "standing"]
 
 
-def _residual_models(
-    scenario: Scenario, residual: pd.DataFrame, stock: Stock
-) -> NDArray[np.int64]:
+def _residual_models(scenario: Scenario, residual: pd.DataFrame, stock: Stock) -> NDArray[np.int64]:
     """Give the models of residual trees."""
     number = []
     for one in residual["residual_id"]:
@@ -293,9 +289,7 @@ def _residual_models(
     return np.array(number, np.int64)
 
 
-def _census(
-    scenario: Scenario, trees: pd.DataFrame, residual: pd.DataFrame, tile: int
-) -> Census:
+def _census(scenario: Scenario, trees: pd.DataFrame, residual: pd.DataFrame, tile: int) -> Census:
     """Tell who the trees are, those of each plot in turn."""
     ids = [trees["tree_id"], -residual["residual_id"]]
     of_residual = [scenario.residual_trees[k - 1].species for k in residual["residual_id"]]
