@@ -14,8 +14,8 @@ from forest.surface.scene import Scene
 from forest.view.scene import import_pyvista, look_at, open_plotter, save
 from forest.view.shading import SUN
 
-_AMBIENT, _SUN, _SKY = 0.3, 0.8, 0.45
-_THROUGH = 0.5  # light that comes through leaves, so that they are not black from below
+_AMBIENT, _SUN, _SKY = 0.3, 0.6, 0.2
+_THROUGH = 0.4  # light that comes through leaves, so that they are not black from below
 _SKY_COLOUR = "#dfe8ef"
 _Say = Callable[[str], object]
 

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.surface.mesh import POINT_DATA, Mesh
-from forest.trees.leaves import LEAF_SHAPES, OUTLINES, Leaves
+from forest.trees.leaves import LEAF_SHAPES, OUTLINES, SPRAY, Leaves
 
 Image = NDArray[np.uint8] | Path
 
 _LEAF_PIXELS = 256
+_NEEDLES, _NEEDLE_WIDE = 20, 0.04  # on each side of a spray; share of its length
 _FINER = 4  # pixels of the outline before it is averaged, along each side
 
 
@@ -145,6 +146,8 @@ def leaf_parts(
 def leaf_image(shape: int) -> NDArray[np.uint8]:
     """Draw a leaf's outline, (h, w, 4): white, lighter along the midrib, opaque within.
 
+    A spray shows its needles.
+
     Parameters
     ----------
     shape : int
@@ -157,15 +160,30 @@ def leaf_image(shape: int) -> NDArray[np.uint8]:
     # A pixel of room all around, so that mipmaps and repeats do not bleed over the edges.
     inner = 1.0 - 2.0 / _LEAF_PIXELS
     along, across = OUTLINES[shape].T
-    x = (0.5 + inner * across) * size
-    y = (1.0 - (0.5 + inner * (along - 0.5))) * size
     mask = Picture.new("L", (size, size))
-    ImageDraw.Draw(mask).polygon(list(zip(x.tolist(), y.tolist(), strict=True)), fill=255)
+    for outline in _needles() if shape == SPRAY else (OUTLINES[shape],):
+        along, across = outline.T
+        x = (0.5 + inner * across) * size
+        y = (1.0 - (0.5 + inner * (along - 0.5))) * size
+        ImageDraw.Draw(mask).polygon(list(zip(x.tolist(), y.tolist(), strict=True)), fill=255)
     alpha = np.asarray(mask.resize((_LEAF_PIXELS, _LEAF_PIXELS), Picture.Resampling.BOX))
     off = np.abs(np.linspace(-1.0, 1.0, _LEAF_PIXELS))[None, :]
     shade = np.broadcast_to(225.0 - 25.0 * off + 30.0 * np.exp(-((off / 0.03) ** 2)), alpha.shape)
     grey = shade.round().astype(np.uint8)
     return np.stack((grey, grey, grey, alpha), axis=2)
+
+
+def _needles() -> list[NDArray[np.float64]]:
+    """Give the outlines of a spray's shoot and needles, which together fill half its card."""
+    found = [np.array([(0.0, -0.02), (0.95, -0.01), (0.95, 0.01), (0.0, 0.02)])]
+    for k in range(_NEEDLES):
+        foot = 0.02 + 0.86 * k / (_NEEDLES - 1)
+        reach = 0.49 * min(0.55 + 2.0 * foot, 1.0, 1.35 * (1.15 - foot))
+        tip = min(foot + 0.35 * reach, 0.97)
+        for side in (-1.0, 1.0):
+            corners = [(foot, 0.0), (tip, reach), (tip + 0.03, reach), (foot + _NEEDLE_WIDE, 0.0)]
+            found.append(np.array(corners) * (1.0, side))
+    return found
 
 
 def encoded(image: Image) -> bytes:

@@ -61,9 +61,8 @@ def blocks(scene: Scene, say: _Say = lambda line: None) -> Iterator[tuple[str, A
 
 def write_scene_vtp(scene: Scene, draft: Path, say: _Say) -> None:
     """Write all in one PolyData."""
-    import pyvista
-
-    pyvista.append_polydata([block for _, block in blocks(scene, say)]).save(draft)
+    first, *others = (block for _, block in blocks(scene, say))
+    first.append_polydata(*others).save(draft)
 
 
 def write_scene_vtm(scene: Scene, draft: Path, to: Path, say: _Say, *, overwrite: bool) -> None:
