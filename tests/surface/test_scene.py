@@ -270,7 +270,7 @@ def test_every_outline_has_an_image() -> None:
 
 def test_a_tree_of_one_internode(models: list[Model]) -> None:
     tree = bush(1, 1)
-    lone = Skeleton(**{**tree.__dict__, "end": tree.start + (0.0, 0.0, 0.1)})
+    lone = Skeleton(**{**tree.__dict__, "end": tree.start + np.array([0.0, 0.0, 0.1])})
     model = Model.of(
         lone,
         models[0].description.leaves,
