@@ -94,12 +94,12 @@ def test_a_stand_is_as_its_run(tmp_path: Path) -> None:
 
 
 def test_residual_trees_stand_with_numbers_below_0(tmp_path: Path) -> None:
-    tree = '{name="old", species="quaking_aspen", x_m=5.0, y_m=5.0, height_m=9.0}'
+    tree = '{name="old", species="lilac", x_m=5.0, y_m=5.0}'
     stand = Stand(tiny("years=1", f"residual_trees=[{tree}]"))
     stand.step()
     census = scene_of(stand, detail="far").census
-    assert census.tree_id[-1] == -1 and census.species[-1] == "quaking_aspen"
-    assert census.dbh_cm[-1] == pytest.approx(stand.residual[0].dbh_cm)
+    assert census.tree_id[-1] == -1 and census.species[-1] == "lilac"
+    assert census.dbh_cm[-1] == pytest.approx(stand.residual.trees[0].dbh_cm)
 
 
 def test_the_command_draws_and_writes_for_vtk(run_file: Path, tmp_path: Path) -> None:
