@@ -94,7 +94,7 @@ def test_a_stand_is_as_its_run(tmp_path: Path) -> None:
 
 
 def test_residual_trees_stand_with_numbers_below_0(tmp_path: Path) -> None:
-    tree = '{name="old", species="lilac", x_m=5.0, y_m=5.0}'
+    tree = '{name="old", species="lilac", x_m=5.0, y_m=5.0, height_m=4.0}'
     stand = Stand(tiny("years=1", f"residual_trees=[{tree}]"))
     stand.step()
     census = scene_of(stand, detail="far").census
