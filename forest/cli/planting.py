@@ -12,6 +12,7 @@ from forest.cli.surfacing import MESH, working, write_parts
 
 
 def tree(
+    context: typer.Context,
     species: Annotated[
         str | None, typer.Argument(help="A parametric species, or a TOML file of one.")
     ] = None,
@@ -54,7 +55,14 @@ def tree(
     from forest.errors import InputError, nearest
     from forest.parametric import grow, load_parameters, parametric_names
 
+    given = _given(context)
     if list_ or species is None:
+        if given or (list_ and species is not None):
+            needs = f"--{given[0].replace('_', '-')} needs a species" if given else ""
+            raise InputError(
+                needs or "--list takes no species",
+                expected="forest tree SPECIES with options, or forest tree --list alone",
+            )
         for name in parametric_names():
             typer.echo(f"{name:<22} {load_parameters(name).common_name}")
         return
@@ -67,6 +75,9 @@ def tree(
     moving = to is not None and to.suffix.lower() == ".gif"
     if moving and wind == 0.0 and gust == 0.0:
         raise InputError("nothing moves in a .gif", expected="--wind or --gust above 0")
+    only_moving = [name for name in given if name in ("frames", "seconds")]
+    if only_moving and not moving:
+        raise InputError(f"--{only_moving[0]} is for a .gif", expected="--to NAME.gif")
     still = grow(parameters, seed, readings=readings, quality=quality)  # type: ignore[arg-type]
     scale = time_scale if time_scale is not None else 2000.0 if moving else 1.0
     times = [time + k * seconds / frames for k in range(frames if moving else 1)]
@@ -95,3 +106,13 @@ def tree(
         draw_sway(moments, to, seconds=seconds, leaves=shown, season=season, overwrite=force)
     else:
         draw_parametric(one, to, leaves=shown, season=season)
+
+
+def _given(context: typer.Context) -> list[str]:
+    """Name the options that stand on the command line, `--list` aside."""
+    return [
+        name
+        for name in context.params
+        if name not in ("species", "list_")
+        and getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
+    ]

@@ -26,6 +26,7 @@ from tests.benchmarks import (
     runs,
     scenes,
     stands,
+    surfaces,
 )
 
 
@@ -97,6 +98,7 @@ def measure(extent: Extent) -> dict[str, Any]:
         extent.frame_trees,
         extent.repeats,
     )
+    result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
