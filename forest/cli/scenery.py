@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from forest.cli.shared import check_targets, shapes_of_year
-
-if TYPE_CHECKING:
-    from forest.surface.scene import Scene
+from forest.cli.shared import check_targets
+from forest.cli.viewing import scenery_of_path
 
 _SUFFIXES = (".glb", ".vtm", ".vtp", ".png")
 
@@ -61,6 +59,7 @@ def scene(
     """
     from forest.errors import InputError
     from forest.surface.scene import scene_range
+    from forest.view.scenery import load_scenery, scene_of
 
     if not 1 <= tile <= 100:
         raise InputError(f"--tile is {tile}", expected="1 to 100")
@@ -71,7 +70,15 @@ def scene(
     is_run = stand.suffix.lower() in (".h5", ".hdf5")
     if not is_run and (year is not None or tile != 1):
         raise InputError("--year and --tile are for run files", where=str(stand))
-    made = _of(stand, year, detail, leaves, season, quality, tile, ground)
+    made = scene_of(
+        scenery_of_path(stand, year, tile) if is_run else load_scenery(stand),
+        detail=detail,
+        leaves=leaves,
+        season=season,
+        quality=quality,
+        ground=ground,
+        say=_say,
+    )
     if to.suffix.lower() == ".png":
         from forest.view.scene_picture import draw_scene
 
@@ -87,38 +94,6 @@ def scene(
         f"{wood + cards:,} triangles once each, {all_wood + all_cards:,} as they stand, "
         f"{to.stat().st_size / 1e6:.1f} MB"
     )
-
-
-def _of(
-    path: Path,
-    year: int | None,
-    detail: str,
-    leaves: bool,
-    season: str | None,
-    quality: float | None,
-    tile: int,
-    ground: bool,
-) -> Scene:
-    from functools import partial
-
-    from forest.view.scenery import load_scenery, scene_of
-
-    make = partial(
-        scene_of,
-        detail=detail,
-        leaves=leaves,
-        season=season,
-        quality=quality,
-        tile=tile,
-        ground=ground,
-        say=_say,
-    )
-    if path.suffix.lower() not in (".h5", ".hdf5"):
-        return make(load_scenery(path))
-    from forest.record.run import open_run
-
-    with open_run(path) as run:
-        return make(run, year, shapes=shapes_of_year(path, run, year))
 
 
 def _say(line: str) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from forest.record.run import Run
     from forest.scenario import Scenario
     from forest.trees.skeleton import Skeleton
 
@@ -98,21 +97,3 @@ def last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]
     stand = Stand.restore(scenario, *found)
     grown = [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
     return stand.year, grown + [stand.residual.skeleton(tree.name) for tree in stand.residual]
-
-
-def shapes_of_year(path: Path, run: Run, year: int | None) -> list[Skeleton]:
-    """Bring back the living trees of a year, the last one unless given.
-
-    None if the last checkpoint is of another year.
-    """
-    from forest.record.checkpoint import checkpoint_paths
-
-    if not len(run.years):
-        return []
-    wanted = int(run.years[-1]) if year is None else year
-    name = f".checkpoint-{wanted - run.scenario.start_year + 1:06d}.npz"
-    kept = checkpoint_paths(path)
-    if not (kept and kept[-1].name.endswith(name)):
-        return []
-    at, found = last_shapes(path, run.scenario)
-    return [shape for shape in found if shape.tree_id > 0] if at == wanted else []

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError, nearest
+from forest.surface.description import Description
 from forest.surface.detail import LAST_LEVEL, LEAF_POINT_MASS, Fractions, Sight, drawn, fractions
 from forest.surface.instances import Colour, Instances, Model
 from forest.surface.mesh import Mesh
@@ -108,6 +109,8 @@ class Scene:
         From where the scene is meant to be seen, m.
     ground : Ground, optional
         Unless it was left out.
+    origin_m : tuple of float
+        What was taken off all x and y, m, since files have single precision.
     """
 
     shapes: tuple[Shape, ...]
@@ -115,6 +118,7 @@ class Scene:
     census: Census
     range_m: float
     ground: Ground | None = None
+    origin_m: tuple[float, float] = (0.0, 0.0)
 
     @property
     def triangles(self) -> tuple[int, int]:
@@ -195,12 +199,12 @@ def build_scene(
     shapes = []
     for number, model in enumerate(models, start=1):
         shares = fractions(range_m, sight, evergreen=model.evergreen)
-        skeleton, all_leaves = model.description.skeleton, model.description.leaves
+        tree = model.description
         shapes.append(
             Shape(
-                skeleton.species or "tree",
-                _wood(skeleton, shares, range_m, model.description.lobes),
-                _foliage(all_leaves, shares) if leaves else no_leaves(),
+                tree.skeleton.species or "tree",
+                _wood(tree, shares, range_m),
+                _foliage(tree.leaves, shares) if leaves else no_leaves(),
                 model.bark,
                 model.foliage[sight.season],
             )
@@ -235,14 +239,15 @@ def ground_of(
     return Ground(Mesh(points, triangles, points[triangles][:, :, :2]), colour)
 
 
-def _wood(skeleton: Skeleton, shares: Fractions, range_m: float, lobes: tuple[int, float]) -> Mesh:
+def _wood(tree: Description, shares: Fractions, range_m: float) -> Mesh:
     """Lay tubes along the axes that are drawn as tubes or as lines."""
     share = np.maximum(shares.stem_polygons, shares.stem_lines)
     return tubes(
-        drawn_axes(skeleton, share),
+        drawn_axes(tree.skeleton, share),
         tolerance_m=_TOLERANCE * range_m,
         most_sides=_MOST_SIDES,
-        lobes=lobes,
+        lobes=tree.lobes,
+        lobed_orders=tree.lobed_levels,
     )
 
 

@@ -49,7 +49,7 @@ def write_scene_glb(
     Notes
     -----
     Trees of one shape share its mesh. A node has the tree's place, scale and, as extras, its
-    `tree_id`, `species` and `dbh_cm`. Cards have no normals: glTF then takes that of the face,
+    `tree_id`, `species` and `dbh_cm`; the scene has its `origin_m`. Cards have no normals: glTF then takes that of the face,
     and the front is the upper face. Their texture coordinates and corners are the same in every
     mesh and stand in the file once.
     """
@@ -80,6 +80,7 @@ class _SceneFile(GltfFile):
         if instanced:
             self._gltf.extensionsUsed = [INSTANCING]
             self._gltf.extensionsRequired = [INSTANCING]
+        self._gltf.scenes[0].extras = {"origin_m": list(map(float, scene.origin_m))}
 
     def add_ground(self) -> None:
         """Add the ground's mesh and its node."""

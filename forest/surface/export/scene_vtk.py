@@ -141,6 +141,7 @@ def _polydata(
     made.cell_data["tree_id"] = np.where(nobody, 0, scene.census.tree_id[owner]).astype(np.int32)
     dbh = np.where(nobody, np.nan, scene.census.dbh_cm[owner])
     made.cell_data["dbh_cm"] = dbh.astype(np.float32)
+    made.field_data["origin_m"] = np.array(scene.origin_m)
     made.cell_data["leaf"] = np.full(len(owner), leaf, np.uint8)
     rgb = [(255.0 * np.array(colour)).round().astype(np.uint8) for _, colour in colours]
     many = [cells or len(owner) for cells, _ in colours]

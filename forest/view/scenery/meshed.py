@@ -31,6 +31,7 @@ def scene_of(
     tile: int = 1,
     ground: bool = True,
     shapes: Iterable[Skeleton] = (),
+    shapes_year: int | None = None,
     say: _Say = lambda line: None,
 ) -> Scene:
     """Make meshes of a whole stand, each shape once, and tell where trees of it stand.
@@ -55,7 +56,9 @@ def scene_of(
     ground : bool
         Whether there is a ground.
     shapes : iterable of Skeleton
-        Of a run: more trees of that year, e.g. those of a checkpoint.
+        Of a run: more trees, e.g. those of a checkpoint.
+    shapes_year : int, optional
+        Their calendar year; the scene's unless given.
     say : callable
         Is told, in a line, how far it is.
 
@@ -65,7 +68,9 @@ def scene_of(
         If the year is not on record, there is no tree, or a word or number is out of its range.
     """
     if isinstance(what, Run):
-        scenery = scenery_of_run(what, year, shapes=shapes, tile=tile, grass=None)
+        scenery = scenery_of_run(
+            what, year, shapes=shapes, shapes_year=shapes_year, tile=tile, grass=None
+        )
     else:
         if year is not None:
             raise InputError("a year is given", expected="one of a run only")
@@ -74,7 +79,7 @@ def scene_of(
     scenery = replace(scenery, **{k: v for k, v in changes.items() if v is not None})
     for note in scenery.notes:
         say(note)
-    return build_scene(
+    made = build_scene(
         scenery.models,
         scenery.instances,
         detail=detail,
@@ -84,3 +89,4 @@ def scene_of(
         ground=ground_of(scenery.terrain, scenery.extent, scenery.ground) if ground else None,
         say=say,
     )
+    return replace(made, origin_m=scenery.origin_m)
