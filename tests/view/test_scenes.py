@@ -120,6 +120,7 @@ def test_scenes_of_files_become_meshes(tmp_path: Path) -> None:
     (tree,) = (node for node in Gltf(to).json["nodes"] if "extras" in node)
     assert tree["extras"] == {"tree_id": 0, "species": "lilac"}
     assert tree["translation"] == [15.0, 0.0, -18.0]
+    assert Gltf(to).json["scenes"][0]["extras"] == {"origin_m": [0.0, 0.0]}
     code, _, err = forest("scene", tmp_path / "scene.toml", "--to", to, "--year", "5", "--force")
     assert code == 2 and "run files" in err
 

@@ -49,9 +49,9 @@ def write_scene_glb(
     Notes
     -----
     Trees of one shape share its mesh. A node has the tree's place, scale and, as extras, its
-    `tree_id`, `species` and `dbh_cm`; the scene has its `origin_m`. Cards have no normals: glTF then takes that of the face,
-    and the front is the upper face. Their texture coordinates and corners are the same in every
-    mesh and stand in the file once.
+    `tree_id`, `species` and `dbh_cm`; the scene has its `origin_m`. Cards have no normals: glTF
+    then takes that of the face, and the front is the upper face. Their texture coordinates and
+    corners are the same in every mesh and stand in the file once.
     """
     file = _SceneFile(scene, instanced)
     if scene.ground is not None:
