@@ -163,7 +163,7 @@ def joint(field: Any, j: Any, x: Any, y: Any, z: Any) -> Any:
     if field.printed[0]:
         return (1.0 - share) * plain + share * printed_blend(x, y, z, a, b), plain, share
     blended = max(hull(x, y, z, a, b), _under_ground(field.cones, joints.first[j], z))
-    rounded = smooth_least(a[0], b[0], joints.thin[j] * share)
+    rounded = smooth_least(a[0], b[0], 0.5 * joints.thin[j] * share)
     return (1.0 - share) * rounded + share * min(blended, rounded), plain, share
 
 
