@@ -254,7 +254,9 @@ def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: 
     for _ in range(steps):
         if abs(f) < 1e-9:
             break
-        gx, gy, gz = gradient(field, x, y, z, which)
+        gx = (value(field, x + _STEP, y, z, which)[0] - f) / _STEP
+        gy = (value(field, x, y + _STEP, z, which)[0] - f) / _STEP
+        gz = (value(field, x, y, z + _STEP, which)[0] - f) / _STEP
         square = max(gx * gx + gy * gy + gz * gz, 0.01)
         step = f / square
         size = abs(step) * np.sqrt(gx * gx + gy * gy + gz * gz)
