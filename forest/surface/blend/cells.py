@@ -71,7 +71,7 @@ class Lattice:
         return np.asarray(self.origin + self.unit * grid, np.float64)
 
 
-def lattice_of(cones: Cones, cell_m: float) -> Lattice:
+def lattice_of(cones: Cones, cell_m: float, in_radius: float = CELLS_IN_RADIUS) -> Lattice:
     """Lay a lattice around all cones; the lowest ground lies within a layer of cells.
 
     Raises
@@ -83,7 +83,7 @@ def lattice_of(cones: Cones, cell_m: float) -> Lattice:
     wide = (thick + cones.widened[cones.axis] + cones.flare[cones.axis, 1])[:, None]
     low = np.min(np.minimum(cones.start, cones.end) - wide, axis=0)
     high = np.max(np.maximum(cones.start, cones.end) + wide, axis=0)
-    level = int(np.floor(np.log2(max(thick.max() / (CELLS_IN_RADIUS * cell_m), 1.0))))
+    level = int(np.floor(np.log2(max(thick.max() / (in_radius * cell_m), 1.0))))
     level = min(level, _LARGEST_LEVEL)
     across = cell_m * 2 ** (level + 1)
     unit = 0.5 * cell_m
@@ -96,10 +96,10 @@ def lattice_of(cones: Cones, cell_m: float) -> Lattice:
     return Lattice(low - 2.37 * across, unit, level + 1)
 
 
-def bytes_needed(cones: Cones, cell_m: float) -> float:
+def bytes_needed(cones: Cones, cell_m: float, in_radius: float = CELLS_IN_RADIUS) -> float:
     """Estimate the memory in bytes that the surface takes while it is made."""
     radius = 0.5 * (cones.low + cones.high)
-    size = cell_m * 2 ** np.floor(np.log2(np.maximum(radius / (CELLS_IN_RADIUS * cell_m), 1.0)))
+    size = cell_m * 2 ** np.floor(np.log2(np.maximum(radius / (in_radius * cell_m), 1.0)))
     length = np.linalg.norm(cones.end - cones.start, axis=1)
     area = 2.0 * np.pi * radius * (length + radius)
     return float(BYTES_PER_CELL * np.sum(1.7 * area / size**2))
@@ -116,9 +116,9 @@ def free_memory() -> float:
     return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
 
 
-def check_memory(cones: Cones, cell_m: float) -> None:
+def check_memory(cones: Cones, cell_m: float, in_radius: float = CELLS_IN_RADIUS) -> None:
     """Refuse cells so small that their surface would not fit into the free memory."""
-    need, free = bytes_needed(cones, cell_m), _PERCENT * free_memory()
+    need, free = bytes_needed(cones, cell_m, in_radius), _PERCENT * free_memory()
     if need > free:
         enough = cell_m * np.sqrt(need / free)
         raise InputError(
@@ -176,8 +176,8 @@ _AROUND = np.array(
 class _Octree:
     """Keeps the leaves of each level while they are found; keys are those of their low corners."""
 
-    def __init__(self, blend: Blend, lattice: Lattice, slope: float) -> None:
-        self.blend, self.lattice, self.slope = blend, lattice, slope
+    def __init__(self, blend: Blend, lattice: Lattice, in_radius: float, slope: float) -> None:
+        self.blend, self.lattice, self.in_radius, self.slope = blend, lattice, in_radius, slope
         self.leaves: list[_Keys] = [np.zeros(0, np.int64) for _ in range(lattice.levels)]
 
     def judge(self, keys: _Keys, level: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
@@ -202,7 +202,7 @@ class _Octree:
             if level >= self.lattice.levels:
                 cut = np.ones(len(keys), np.bool_)
             else:
-                cut = (level > 0) & (cell * (1 << level) * CELLS_IN_RADIUS > thin * (1.0 + 1e-9))
+                cut = (level > 0) & (cell * (1 << level) * self.in_radius > thin * (1.0 + 1e-9))
                 self.leaves[level] = np.union1d(self.leaves[level], keys[~cut])
             keys = self.split(keys[cut], level)
             level -= 1
@@ -248,9 +248,11 @@ def _coarse(cones: Cones, lattice: Lattice) -> _Keys:
     return np.unique(pack(cells << (lattice.levels + 1)))
 
 
-def cells_near(blend: Blend, lattice: Lattice, slope: float = SLOPE) -> list[_Keys]:
+def cells_near(
+    blend: Blend, lattice: Lattice, in_radius: float = CELLS_IN_RADIUS, slope: float = SLOPE
+) -> list[_Keys]:
     """Find the cells that the surface passes, by level, as sorted keys of their low corners."""
-    octree = _Octree(blend, lattice, slope)
+    octree = _Octree(blend, lattice, in_radius, slope)
     octree.refine(_coarse(blend.limbs.cones, lattice), lattice.levels)
     octree.balance()
     return octree.leaves

@@ -135,9 +135,7 @@ def _emit(
 
 
 @njit
-def _triangle(
-    key: Any, at: Any, n: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any
-) -> None:
+def _triangle(key: Any, at: Any, n: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> None:
     key[at, 0] = min(a, b) * n + max(a, b)
     key[at, 1] = min(c, d) * n + max(c, d)
     key[at, 2] = min(e, f) * n + max(e, f)
@@ -273,7 +271,7 @@ def march(
 
 
 #: Rounds in which vertices move towards the middle of their neighbours, along the surface.
-_ROUNDS = 3
+_ROUNDS = 2
 
 
 def _even(
@@ -285,7 +283,7 @@ def _even(
 ) -> NDArray[np.float64]:
     """Pull vertices onto the surface and even out the triangles."""
     kernel = blend.kernel
-    in_threads(_settle, kernel, points, most, np.int64(3), hints)
+    in_threads(_settle, kernel, points, most, np.int64(2), hints)
     count = np.bincount(triangles.ravel(), minlength=len(points))[:, None].astype(np.float64)
     for left in range(_ROUNDS - 1, -1, -1):
         middle = np.zeros_like(points)
@@ -298,5 +296,5 @@ def _even(
         size = np.linalg.norm(step, axis=1)
         step *= np.minimum(1.0, 0.5 * most / np.maximum(size, 1e-12))[:, None]
         points = points + step
-        in_threads(_settle, kernel, points, most, np.int64(1 if left else 4), hints)
+        in_threads(_settle, kernel, points, most, np.int64(1 if left else 5), hints)
     return points
