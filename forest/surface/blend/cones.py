@@ -407,14 +407,14 @@ def _joints(skeleton: Skeleton, cones: Cones, chains: list[_Ints], first: _Ints)
             place.append(len(rows))
     n = len(rows)
     point = np.array([row[0] for row in rows]).reshape(n, 3)
-    reach = np.array([row[1] for row in rows])
+    reaches = np.array([row[1] for row in rows])
     lower, upper = np.zeros((n, 2), np.int64), np.zeros((n, 2), np.int64)
     for j, row in enumerate(rows):
-        for k in range(2):
-            lower[j, k], upper[j, k] = _within(cones, first, row[3 + k], point[j], reach[j])
+        for k, axis in enumerate(row[3:]):
+            lower[j, k], upper[j, k] = _within(cones, first, int(axis), point[j], float(reaches[j]))
     return Joints(
         point=point,
-        reach=reach,
+        reach=reaches,
         thin=np.array([row[2] for row in rows]),
         first=lower,
         last=upper,
