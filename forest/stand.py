@@ -30,6 +30,7 @@ from forest.measure.trees import MeasureSpecies, TreeMeasures, measure_trees
 from forest.mechanics.shelter import Plot
 from forest.mechanics.year import Mechanics, MechanicsSpec
 from forest.renewal import Regeneration
+from forest.residual import ResidualTrees
 from forest.scenario.inventory import Inventory
 from forest.stand_state import Memory, put_state, take_state
 from forest.trees import table
@@ -92,6 +93,8 @@ class Stand(management.Hand):
         What acts changed since the last record.
     dead_wood : DeadWood or None
         Snags and lying dead wood, where the scenario has snags.
+    residual : ResidualTrees
+        Trees that were not simulated: those that stand now, one by one, or all as its `table`.
     memories : dict of str to Memory
         The parts that remember something between years, for checkpoints.
     seconds : dict of str to float
@@ -134,6 +137,9 @@ class Stand(management.Hand):
             "treatments": self.treatments,
             "storms": self.storms,
         }
+        self.residual = ResidualTrees(scenario, self.surroundings)
+        if self.residual.trees:
+            self.memories["residual"] = self.residual
         self.mechanics: Mechanics | None = None
         if scenario.mechanics is not None:
             spec = MechanicsSpec(**scenario.mechanics.model_dump())

@@ -91,7 +91,8 @@ class YearRecord(NamedTuple):
     tables : dict of table to columns
         The year's rows of `/trees`, `/stand`, `/events`, `/rings`, `/carbon`, `/climate`, where
         the scenario has them `/stability`, `/deadwood` and `/regeneration`, where acts were done
-        `/treatments`, and where the wind blew `/storms`.
+        `/treatments`, where the wind blew `/storms`, and where there are residual
+        trees `/residual`.
     samples : dict of tree id to SampleYear
         The year in the lives of the sample trees.
     """
@@ -166,6 +167,8 @@ def record_year(
     blown = stand.storms.take(stand.year)
     if blown:
         tables["storms"] = blown
+    if stand.residual.trees:
+        tables["residual"] = stand.residual.columns(stand.year, stand.steps)
     return YearRecord(stand.year, tables, _sample_years(stand, deaths, serials_before))
 
 

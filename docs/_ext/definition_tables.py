@@ -20,10 +20,10 @@ from sphinx.util.docutils import SphinxDirective
 
 import forest
 from forest.interop.mapping import mapping_markdown
-from forest.parametric.parameters import PAPER_LEVEL_NAMES, PAPER_NAMES, Parameters
 from forest.record.schema import columns_markdown
 from forest.scenario import Scenario
 from forest.species import Species, describe, load_species, species_names
+from forest.species.parametric import PAPER_LEVEL_NAMES, PAPER_NAMES, Parameters
 from forest.view.scenery.file import SceneFile
 
 
@@ -35,15 +35,15 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     )
 
 
-def keys_by_table(model: Any, leave_out: str = "") -> str:
+def keys_by_table(model: Any, leave_out: tuple[str, ...] = ()) -> str:
     """List the keys of a model, one Markdown table for each table of the file.
 
-    Tables whose dotted name starts with `leave_out` are described elsewhere.
+    Tables whose dotted names start with one of `leave_out` are described elsewhere.
     """
     tables: dict[str, list[list[str]]] = {}
     for row in describe(model):
         table, _, key = row.key.rpartition(".")
-        if leave_out and table.startswith(leave_out):
+        if table.startswith(leave_out):
             continue
         tables.setdefault(table, []).append(
             [
@@ -149,7 +149,10 @@ def _directive(text: Any) -> type[SphinxDirective]:
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the directives with Sphinx."""
     app.add_directive(
-        "scenario-keys", _directive(lambda: keys_by_table(Scenario, "species.<name>."))
+        "scenario-keys",
+        _directive(
+            lambda: keys_by_table(Scenario, ("species.<name>.", "residual_trees[].parameters"))
+        ),
     )
     app.add_directive("species-keys", _directive(lambda: keys_by_table(Species)))
     app.add_directive("species-values", _directive(values_side_by_side))

@@ -25,9 +25,12 @@ def export(
     to: Annotated[Path, typer.Option(metavar="FILE", help="File; a table's: .csv or .parquet.")],
     table: Annotated[
         str | None,
-        typer.Option(help="trees, stand, events, rings, carbon, stability, storms or population."),
+        typer.Option(help="trees, stand, events, rings, carbon, stability, residual or another."),
     ] = None,
     tree: Annotated[int | None, typer.Option(metavar="ID", help="A sample tree's shape.")] = None,
+    residual: Annotated[
+        str | None, typer.Option(metavar="NAME", help="A residual tree's shape.")
+    ] = None,
     year: Annotated[
         int | None, typer.Option(help="The shape's year; default: the run's last.")
     ] = None,
@@ -39,7 +42,9 @@ def export(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
-    """Write a table of a run as CSV or Parquet, or a sample tree's shape as a cylinder model.
+    """Write a table of a run as CSV or Parquet, or a tree's shape as a cylinder model.
+
+    The shape is that of a sample tree or of a residual one.
 
     Examples:
 
@@ -54,14 +59,19 @@ def export(
     from forest.errors import InputError
     from forest.record.run import open_run
 
-    if (table is None) == (tree is None):
-        what = "nothing to export" if table is None else "--table and --tree exclude each other"
-        raise InputError(what, expected="--table NAME or --tree ID")
-    if table is not None and year is not None:
-        raise InputError("--year goes with --tree", expected="a table with all its years")
+    asked = {"--table": table, "--tree": tree, "--residual": residual}
+    given = [name for name, value in asked.items() if value is not None]
+    if len(given) != 1:
+        what = " and ".join(given) + " exclude each other" if given else "nothing to export"
+        raise InputError(what, expected="--table NAME, --tree ID or --residual NAME")
+    if tree is None and year is not None:
+        expected = "a table with all its years" if table else "a shape that stays as it is"
+        raise InputError("--year goes with --tree", expected=expected)
     with open_run(run_file) as run:
         if tree is not None:
             _export_tree(run, tree, year, form, to, force)
+        elif residual is not None:
+            _export_residual(run, residual, form, to, force)
         elif table is not None:
             _export_table(run, table, form, to, force)
 
@@ -94,6 +104,21 @@ def _export_tree(
     skeleton = run.skeleton(tree, at)
     written = write(skeleton, to, overwrite=force)
     typer.echo(f"{written}: {len(skeleton):,} cylinders, tree {tree} in {at}")
+
+
+def _export_residual(run: Any, name: str, form: str | None, to: Path, force: bool) -> None:
+    from forest import interop
+    from forest.errors import InputError, nearest
+    from forest.residual import grow_residual
+
+    write = getattr(interop, _named(form, _TREES, "a tree"))
+    known = {tree.name: k + 1 for k, tree in enumerate(run.scenario.residual_trees)}
+    if name not in known:
+        hint = nearest(name, known) if known else "the run has none"
+        raise InputError(f"no residual tree '{name}', {hint}", where=str(run.path))
+    tree = grow_residual(run.scenario.residual_trees[known[name] - 1], known[name])
+    written = write(tree.skeleton, to, overwrite=force)
+    typer.echo(f"{written}: {len(tree.skeleton):,} cylinders, residual tree '{name}'")
 
 
 def _named(form: str | None, forms: dict[str, str], what: str) -> str:

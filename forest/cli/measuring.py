@@ -47,11 +47,14 @@ def measure(
         from rich.console import Console
 
         from forest.measure.gaps import gaps
-        from forest.view.measured_table import gaps_line, species_table
+        from forest.view.measured_table import gaps_line, residual_lines, species_table
 
         plot, trees = plot_of(run.scenario), measure_run(run, at)
         Console().print(species_table(trees, plot.hectares))
         typer.echo(gaps_line(gaps(trees, plot)))
+        if "residual" in run.tables:
+            for line in residual_lines(run.read("residual", years=(at, at))):
+                typer.echo(line)
 
 
 def bucking(

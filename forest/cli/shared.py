@@ -78,7 +78,10 @@ def check_targets(*targets: tuple[Path | None, tuple[str, ...]], force: bool) ->
 
 
 def last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]]:
-    """Bring back all trees as they were at the last checkpoint: calendar year and shapes."""
+    """Bring back all trees as they were at the last checkpoint: calendar year and shapes.
+
+    Residual trees that stand come last, with numbers below 0.
+    """
     from forest.errors import InputError
     from forest.record.checkpoint import latest_checkpoint
 
@@ -92,4 +95,5 @@ def last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]
     from forest.stand import Stand
 
     stand = Stand.restore(scenario, *found)
-    return stand.year, [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
+    grown = [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
+    return stand.year, grown + [stand.residual.skeleton(tree.name) for tree in stand.residual]

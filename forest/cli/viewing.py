@@ -115,7 +115,7 @@ def _of_run(path: Path, year: int | None, tile: int) -> Scenery:
             kept = checkpoint_paths(path)
             if kept and kept[-1].name.endswith(name):
                 at, found = last_shapes(path, run.scenario)
-                shapes = found if at == wanted else []
+                shapes = [s for s in found if s.tree_id > 0] if at == wanted else []
         return scenery_of_run(run, year, shapes=shapes, tile=tile)
 
 

@@ -24,6 +24,7 @@ from forest.environment.site_light import (
     read_light,
 )
 from forest.environment.sky import sky_directions, sun_directions
+from forest.environment.standing import StandingLeaves
 from forest.environment.voxels import bound_blocks, deal_blocks
 from forest.errors import InputError
 from forest.trees.buds import Shoots
@@ -194,10 +195,16 @@ class Light:
             weights=weights,
         )
 
-    def expose(self, metamers: Metamers, trees: Trees, others: PlantArea | None = None) -> None:
+    def expose(
+        self,
+        metamers: Metamers,
+        trees: Trees,
+        others: PlantArea | None = None,
+        standing: StandingLeaves | None = None,
+    ) -> None:
         """Rebuild both fields from the living buds and set `metamers.light` of every node.
 
-        `others` shades in the far field alone.
+        `others` shades in the far field alone, `standing` in the near field alone.
         """
         blocks = deal_blocks(trees)
         bounds = bound_blocks(metamers, trees, blocks, self._voxel_m)
@@ -206,7 +213,7 @@ class Light:
             occupied[:, 0::2].min(axis=0, initial=2**40) if len(occupied) else np.ones(3, np.int64)
         )
         high = occupied[:, 1::2].max(axis=0, initial=-(2**40)) if len(occupied) else 0 * low
-        near = self._clear_near(low, high)
+        near = self._clear_near(low, high, standing)
         far = self._clear_far(low, high, others)
         plot = self._cut_slabs(low, high, max(far.ratio, 1))
         deposit(metamers, trees, blocks, bounds, plot, near, far, self._units)
@@ -218,9 +225,14 @@ class Light:
             self._canopy.illuminate(coarse_depth(self._solid_voxels, far))
         read_light(metamers, trees, blocks, plot, near, far, self._units, self._full_light)
 
-    def _clear_near(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> ShadowField:
+    def _clear_near(
+        self, low: NDArray[np.int64], high: NDArray[np.int64], standing: StandingLeaves | None
+    ) -> ShadowField:
         if self._grid is None:
             return no_shadow()
+        if standing is not None and np.all(low <= high):
+            reach = self._grid.q_max + int(np.abs(self._around.offset).max(initial=1))
+            low, high = standing.widen(low, high, reach, self._periodic)
         if len(self._solid_voxels):
             top = int(self._solid_voxels[:, 2].max())
             high = high.copy()
@@ -231,6 +243,8 @@ class Light:
             inside = np.all((place >= 0) & (place < self._grid.counts.shape[::-1]), axis=1)
             x, y, z = place[inside].T
             self._grid.counts[z, y, x] = self._solid_count
+        if standing is not None:
+            standing.add_to(self._grid.field, self._shape)
         return self._grid.field
 
     def _clear_far(

@@ -8,7 +8,7 @@ marker per cell of a grid, its place a hash of seed and cell, so that no coordin
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from forest.environment.marker_tiles import (
     Rows,
     Sites,
 )
+from forest.environment.standing import StandingSites
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
 
@@ -131,7 +132,13 @@ class MarkerSpace:
         """Edges of a cell along x, y and z, m."""
         return self._cell.copy()
 
-    def claim(self, metamers: Metamers, trees: Trees, species: MarkerSpecies) -> BudSpace:
+    def claim(
+        self,
+        metamers: Metamers,
+        trees: Trees,
+        species: MarkerSpecies,
+        standing: StandingSites | None = None,
+    ) -> BudSpace:
         """Take the markers near living buds and share out the others.
 
         Parameters
@@ -140,6 +147,8 @@ class MarkerSpace:
             The stand; not changed.
         species : MarkerSpecies
             Parameters of each species in the table.
+        standing : StandingSites, optional
+            Points that take markers beside the buds, and perceive none.
 
         Returns
         -------
@@ -149,11 +158,15 @@ class MarkerSpace:
         buds = list_buds(metamers, trees)
         sites = _sites(species)
         n = len(buds.species)
+        competitors = buds
+        if standing is not None:
+            competitors, sites = _with_standing(buds, sites, standing)
         found = np.zeros(n, np.int32)
         direction = np.zeros((n, 3), np.float32)
-        lattice = self._lattice(buds, sites)
+        lattice = self._lattice(competitors, sites)
         if lattice is not None:
-            found, direction = self._share_out(lattice, buds, sites)
+            found, direction = self._share_out(lattice, competitors, sites)
+            found, direction = found[:n], direction[:n]
         return BudSpace(
             buds.first_of_tree, buds.tree_row, buds.metamer, buds.kind, found, direction
         )
@@ -294,6 +307,26 @@ def _sites(species: MarkerSpecies) -> Sites:
         species.perception_distance_m.astype(np.float64),
         cosine,
         np.sqrt(np.maximum(1.0 - cosine**2, 0.0)),
+    )
+
+
+def _with_standing(buds: Buds, sites: Sites, standing: StandingSites) -> tuple[Buds, Sites]:
+    """Enter points as buds that look nowhere, each kind of them as a species of its own."""
+    n, kinds = len(standing.kind), len(standing.radius_m)
+    more = buds._replace(
+        tree_row=np.full(n, len(buds.first_of_tree) - 1, np.int32),
+        metamer=np.zeros(n, np.int32),
+        kind=np.zeros(n, np.uint8),
+        serial=np.arange(n, dtype=np.int32),
+        species=(len(sites.occupancy) + standing.kind).astype(np.int16),
+        position=standing.point,
+        heading=np.zeros((n, 3), np.float32),
+    )
+    both: Any = zip(buds[1:], more[1:], strict=True)
+    blind = (standing.radius_m, np.zeros(kinds), np.ones(kinds), np.zeros(kinds))
+    return (
+        Buds(buds.first_of_tree, *(np.concatenate(pair) for pair in both)),
+        Sites(*(np.concatenate(pair) for pair in zip(sites, blind, strict=True))),
     )
 
 

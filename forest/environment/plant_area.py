@@ -31,6 +31,14 @@ class PlantArea(NamedTuple):
         voxel = np.floor(place_m / voxel_m).astype(np.int64)
         return cls(voxel, np.rint(area_m2 * 1e6).astype(np.int64))
 
+    def joined(self, more: PlantArea | None) -> PlantArea:
+        """Put both together."""
+        if more is None:
+            return self
+        return PlantArea(
+            np.concatenate((self.voxel, more.voxel)), np.concatenate((self.area_mm2, more.area_mm2))
+        )
+
     def add_to(self, far: CanopyField, shape: tuple[int, int]) -> None:
         """Add the areas to a far field that has room for them.
 

@@ -22,6 +22,7 @@ from forest.environment.obstacles import Box, Mesh, Solid
 from forest.environment.plant_area import PlantArea
 from forest.environment.rendered_kernels import Looks
 from forest.environment.rendered_light import RenderedLight, RenderedSpec
+from forest.environment.standing import Standing
 from forest.trees.buds import Shoots
 from forest.trees.metamers import Metamers
 from forest.trees.table import Trees
@@ -45,7 +46,11 @@ class Surroundings:
         Edge of the near-field voxels in which trees' bases are given, m.
     full_light : float
         Light Q of an unshaded bud.
+    standing : Standing or None
+        Trees that shade and take room, but do not grow.
     """
+
+    standing: Standing | None = None
 
     def __init__(self, scenario: Scenario, pipe_exponent: NDArray[np.float64]) -> None:
         spec = scenario.environment
@@ -129,12 +134,18 @@ class Surroundings:
         others : PlantArea, optional
             What shades beside living trees, in the far field.
         """
+        standing = self.standing
         if self._rendered is not None:
             self._rendered.expose(metamers, trees, step)
         else:
-            self._light.expose(metamers, trees, others)
+            if standing is not None:
+                others = standing.leaves.plant_area.joined(others)
+            leaves = None if standing is None else standing.leaves
+            self._light.expose(metamers, trees, others, leaves)
         if self._markers is not None:
-            space = self._markers.claim(metamers, trees, self._marker_species)
+            space = self._markers.claim(
+                metamers, trees, self._marker_species, None if standing is None else standing.sites
+            )
             apply_space(metamers, trees, space)
             self._space = _by_serial(metamers, trees, space)
 

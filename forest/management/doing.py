@@ -103,6 +103,8 @@ def fell(stand: Stand, act: int, felling: Felling, measures: TreeMeasures) -> Tr
     if stand.regeneration is not None:
         stand.regeneration.note_stumps(stand.rows, rows.tolist(), measures)
     left = take_out(stand, rows, "felled", felling.cause, measures)
+    for name in felling.residual:
+        stand.residual.fell(stand.residual.row_of(name, "fell"), stand.steps + 1)
     stand.treatments.note(act, felling.kind, before, after)
     return left
 

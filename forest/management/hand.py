@@ -112,6 +112,24 @@ class Hand:
         doing.fell(stand, BY_HAND, felling, stand.measure())
         return felling.tree_ids
 
+    def fell_residual(self, name: str) -> None:
+        """Fell a residual tree: from the next step on it neither shades nor takes room.
+
+        Parameters
+        ----------
+        name : str
+            Its name in the scenario.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree, or it was felled.
+        """
+        stand = cast("Stand", self)
+        stand.residual.row_of(name, "Stand.fell_residual")
+        felling = Felling("fell", [], "harvest", (name,))
+        doing.fell(stand, BY_HAND, felling, stand.measure())
+
     def blow(self, speed_m_s: float, direction_deg: float = 0.0) -> list[int]:
         """Let a storm break and uproot trees between two years.
 

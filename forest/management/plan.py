@@ -38,11 +38,12 @@ class Places(NamedTuple):
 
 
 class Felling(NamedTuple):
-    """Trees that are felled, and why."""
+    """Trees that are felled, and why; and names of residual trees that are."""
 
     kind: str
     tree_ids: list[int]
     cause: str
+    residual: tuple[str, ...] = ()
 
 
 class YearOfActs(NamedTuple):
@@ -108,7 +109,9 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
             if isinstance(act, Plant):
                 plan.plantings[i] = _places(act, stand, census, standing, plan, numbers[i])
             else:
-                felling = _felling(act, stand, census, standing, numbers[i], f"acts[{i}]")
+                where = f"acts[{i}]"
+                gone = [name for done in plan.fellings.values() for name in done.residual]
+                felling = _felling(act, stand, census, standing, gone, numbers[i], where)
                 plan.fellings[i] = felling
                 standing &= ~np.isin(census.tree_id, felling.tree_ids)
         except InputError as refusal:
@@ -160,13 +163,22 @@ def _due(
 
 
 def _felling(
-    act: Act, stand: Stand, census: Census, standing: Mask, number: int, where: str
+    act: Act,
+    stand: Stand,
+    census: Census,
+    standing: Mask,
+    gone: Sequence[str],
+    number: int,
+    where: str,
 ) -> Felling:
     if isinstance(act, Fell):
         year = stand.year + 1
         rows = [row_of(stand.rows, i, where=f"{where}.tree_ids in {year}") for i in act.tree_ids]
         ids = [i for i, row in zip(act.tree_ids, rows, strict=True) if standing[row]]
-        return Felling("fell", list(dict.fromkeys(ids)), act.cause)
+        for name in act.residual:
+            stand.residual.row_of(name, f"{where}.residual in {year}")
+        names = [name for name in act.residual if name not in gone]
+        return Felling("fell", list(dict.fromkeys(ids)), act.cause, tuple(dict.fromkeys(names)))
     if isinstance(act, Thin):
         chosen = to_thin(act, census, stand, standing, number)
         return Felling("thin", census.tree_id[np.sort(chosen)].tolist(), act.cause)
@@ -194,8 +206,8 @@ def fill(
     names, shares = act.mix({name: use.share for name, use in scenario.species.items()})
     new_x, new_y, kind = pattern_places(
         act,
-        x,
-        y,
+        np.concatenate((x, stand.residual.places_m[:, 0])),
+        np.concatenate((y, stand.residual.places_m[:, 1])),
         shares,
         plot_of(scenario),
         scenario.seed,

@@ -10,7 +10,7 @@ import numpy as np
 from h5py import h5s
 from numpy.typing import NDArray
 
-from forest.record.schema import Column, Table
+from forest.record.definition import Column, Table
 
 _FASTEST = 1  # gzip level: higher ones save a few per cent of size for several times the time
 

@@ -139,6 +139,11 @@ class Run:
         return self._frame("storms")
 
     @property
+    def residual(self) -> pd.DataFrame:
+        """A row per residual tree and year in which it stood, or before which it was felled."""
+        return self._frame("residual")
+
+    @property
     def population(self) -> pd.DataFrame:
         """A row per year: the ledger of the living."""
         return self._frame("population")

@@ -7,7 +7,15 @@ tables.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+
+from forest.record.definition import (
+    RESIDUAL_NAMES,
+    RESIDUAL_SPECIES,
+    SPECIES,
+    SPECIES_OR_ALL,
+    Column,
+    Table,
+)
 
 FILE_TYPE = "forest run"
 SCHEMA_VERSION = 2
@@ -50,63 +58,13 @@ DEATH_CAUSES = (
 FELLING_CAUSES = ("thinning", "harvest", "tending")
 ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest")
 STAGES = ("before", "after")
+RESIDUAL_STATUS = ("standing", "felled")
 
 #: What a storm does to a tree.
 STORM_OUTCOMES = ("stood", "broken", "uprooted")
 
 #: Discs at heights that the scenario names, or where the crown begins in the year.
 RING_PLACES = ("height", "crown_base")
-
-#: Levels of a column of species: the run's own list, without or with the entry for all of them.
-SPECIES = ("<species>",)
-SPECIES_OR_ALL = ("<species>", "all")
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column of a table.
-
-    Attributes
-    ----------
-    name : str
-        Name of the dataset.
-    dtype : str
-        NumPy dtype as stored.
-    unit : str
-        Unit; empty for counts, codes and shares.
-    description : str
-        Meaning.
-    missing : str
-        How a missing value is stored; empty if none can be missing.
-    levels : tuple of str
-        For codes: the names that 0, 1, 2... stand for.
-    """
-
-    name: str
-    dtype: str
-    unit: str
-    description: str
-    missing: str = ""
-    levels: tuple[str, ...] = ()
-
-    def with_species(self, species_names: Sequence[str]) -> Column:
-        """Give the column with the run's own species in place of the placeholder."""
-        if self.levels[:1] != SPECIES:
-            return self
-        return replace(self, levels=(*species_names, *self.levels[1:]))
-
-
-@dataclass(frozen=True)
-class Table:
-    """One table: what a row is, and its columns."""
-
-    row: str
-    columns: tuple[Column, ...]
-
-    def with_species(self, species_names: Sequence[str]) -> Table:
-        """Give the table with the run's own species as levels."""
-        columns = tuple(column.with_species(species_names) for column in self.columns)
-        return replace(self, columns=columns)
 
 
 def _number(name: str, unit: str, description: str, dtype: str = "float32") -> Column:
@@ -346,6 +304,26 @@ STORMS = Table(
     ),
 )
 
+RESIDUAL = Table(
+    "a residual tree and year in which it stood, and one for the year before whose growth it was "
+    "felled; where the scenario has residual trees",
+    (
+        _YEAR,
+        _count("residual_id", "of the tree in the scenario's list, from 1"),
+        Column("name", "int16", "", "its name", levels=RESIDUAL_NAMES),
+        Column("species", "int16", "", "its parametric species", levels=RESIDUAL_SPECIES),
+        Column("status", "int8", "", "whether it still stood", levels=RESIDUAL_STATUS),
+        Column("x_m", "float32", "m", "place of the stem base"),
+        Column("y_m", "float32", "m", "place of the stem base"),
+        _number("height_m", "m", "height of the highest tip"),
+        _number("dbh_cm", "cm", "stem diameter over bark at 1.3 m"),
+        _number("crown_base_m", "m", "height of the lowest leaf-bearing tip"),
+        _number("crown_radius_m", "m", "mean reach of the crown in eight directions"),
+        _number("leaf_area_m2", "m2", "one-sided area of its leaves"),
+        _number("stem_volume_m3", "m3", "volume of the stem, over bark"),
+    ),
+)
+
 POPULATION = Table(
     "a year: the ledger of the living",
     (
@@ -373,6 +351,7 @@ TABLES: dict[str, Table] = {
     "regeneration": REGENERATION,
     "treatments": TREATMENTS,
     "storms": STORMS,
+    "residual": RESIDUAL,
 }
 
 #: The tables that a run file may hold.

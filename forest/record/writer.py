@@ -66,6 +66,7 @@ class RunWriter:
         seed: int,
         species_names: Sequence[str],
         threads: int,
+        residual: Sequence[tuple[str, str]] = (),
         tables: Sequence[str] = tuple(TABLES),
         trees_per_year: int = 1024,
         command: Sequence[str] = (),
@@ -85,6 +86,8 @@ class RunWriter:
             The names that species codes 0, 1, 2... stand for.
         threads : int
             Number of threads; on record only.
+        residual : sequence of (str, str)
+            Names and species of the residual trees, in their order.
         tables : sequence of str
             The tables to store, of `TABLES`; the population ledger is always stored.
         trees_per_year : int
@@ -131,9 +134,12 @@ class RunWriter:
                         "provenance": provenance.model_dump_json(),
                     }
                 )
+                names = [name for name, _ in residual]
+                kinds = list(dict.fromkeys(kind for _, kind in residual))
                 large = _chunk(trees_per_year)
                 for name in stored:
                     table = ALL_TABLES[name].with_species(species_names)
+                    table = table.with_residual(names, kinds)
                     chunk = large if name in ("trees", "rings") else _SMALL_CHUNK
                     ColumnGroup.create(file, name, table, chunk)
                 ColumnGroup.create(file, "steps", steps_table(stored), _SMALL_CHUNK)

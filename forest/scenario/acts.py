@@ -161,13 +161,27 @@ class Prune(Pruning, Timing):
 
 
 class Fell(Timing):
-    """Fell trees."""
+    """Fell trees, residual trees, or both."""
 
     kind: Literal["fell"] = quantity("fell", "kind of act", unit="")
-    tree_ids: tuple[_Id, ...] = quantity(..., "the trees", unit="", min_length=1, max_length=_MOST)
+    tree_ids: tuple[_Id, ...] = quantity((), "the trees", unit="", max_length=_MOST)
+    residual: tuple[str, ...] = quantity(
+        (), "names of residual trees, or one name", unit="", max_length=10000
+    )
     cause: Literal["harvest", "thinning", "tending"] = quantity(
         "harvest", "why, in the events; what tending fells is left lying", unit=""
     )
+
+    @field_validator("residual", mode="before")
+    @classmethod
+    def _one_name(cls, residual: Any) -> Any:
+        return (residual,) if isinstance(residual, str) else residual
+
+    @model_validator(mode="after")
+    def _fells_something(self) -> Self:
+        if not self.tree_ids and not self.residual:
+            raise Refusal("missing", key="tree_ids", expected="tree_ids or residual")
+        return self
 
     @property
     def in_words(self) -> str:

@@ -19,7 +19,7 @@ MESH_SUFFIXES = (".stl", ".obj", ".ply", ".vtp")
 _LIMIT_M = 1e5
 
 
-def _locate(file: str, context: Any) -> Path:
+def locate(file: str, context: Any) -> Path:
     """Find a file that is named relative to the scenario's folder."""
     folder = context["folder"] if context else Path()
     try:
@@ -32,7 +32,7 @@ def _rows(
     file: str, context: Any, columns: tuple[str, ...]
 ) -> Iterator[tuple[int, dict[str, str]]]:
     """Read a CSV's rows with their line numbers; `columns` must be there."""
-    path = _locate(file, context)
+    path = locate(file, context)
     try:
         text = read_text(path, where="")
     except InputError as error:
@@ -207,7 +207,7 @@ def read_cloud(file: str, context: Any) -> list[tuple[float, float, float]]:
 
 def find_mesh(file: str, context: Any) -> str:
     """Check that a mesh file exists and is of a known kind; give its absolute path."""
-    path = _locate(file, context)
+    path = locate(file, context)
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise Refusal(f"{file!r} is no mesh", expected=" | ".join(MESH_SUFFIXES))
     try:

@@ -13,6 +13,7 @@ from forest.scenario.inventory import Inventory
 from forest.scenario.model import Explicit, Random, Regular
 from forest.scenario.mortality import check_mortality
 from forest.scenario.regeneration import check_regeneration
+from forest.scenario.residual import check_felled_residual, check_residual
 from forest.scenario.wind import check_wind
 from forest.species.schema import Refusal
 
@@ -42,6 +43,11 @@ def check_fit(scenario: Scenario) -> None:
     shares = {name: use.share for name, use in scenario.species.items()}
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.planned_calendar, regular)
+    residual = scenario.residual_trees
+    check_residual(
+        residual, scenario.planting, scenario.plot, scenario.species, scenario.environment
+    )
+    check_felled_residual(scenario.acts, residual, scenario.planned_calendar)
     check_wind(scenario)
     check_mortality(
         scenario.mortality,

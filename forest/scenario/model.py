@@ -31,6 +31,7 @@ _TableName = Literal[
     "regeneration",
     "treatments",
     "storms",
+    "residual",
 ]
 
 
@@ -368,6 +369,12 @@ class SampleTrees(Table):
     at_year: int | None = quantity(
         None, "calendar year of the quantiles; default: the last year", unit="year"
     )
+    meshes: Literal["glb", "obj", "ply", "vtp"] | None = quantity(
+        None,
+        "format in which each tree's surface is written when the run is done, as it was in its "
+        "last year, into the folder RUN_meshes beside the run file",
+        unit="",
+    )
 
 
 class Output(Table):
@@ -377,7 +384,8 @@ class Output(Table):
         get_args(_TableName),
         "tables to write; stability only has rows where there is a table mechanics, deadwood "
         "where there are snags, regeneration where there is a table of that name, treatments "
-        "where there are acts, storms where the wind blew",
+        "where there are acts, storms where the wind blew; residual is written where there are "
+        "residual trees",
         unit="",
         max_length=len(get_args(_TableName)),
     )

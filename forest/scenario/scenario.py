@@ -36,6 +36,7 @@ from forest.scenario.model import (
 from forest.scenario.mortality import Mortality
 from forest.scenario.overrides import Changes
 from forest.scenario.regeneration import Regeneration
+from forest.scenario.residual import ResidualTree, number_seeds
 from forest.scenario.wind import Wind
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
@@ -97,6 +98,12 @@ class Scenario(Table):
     planting: Planting
     obstacles: tuple[Obstacle, ...] = quantity(
         (), "what blocks growth and casts shade", unit="", max_length=10000
+    )
+    residual_trees: tuple[ResidualTree, ...] = quantity(
+        (),
+        "trees that were not simulated: they stand, shade and take room until they are felled",
+        unit="",
+        max_length=1000,
     )
     acts: tuple[Act, ...] = quantity(
         (),
@@ -193,6 +200,11 @@ class Scenario(Table):
         if not isinstance(species, dict):
             return species
         return {name: complete(name, given) for name, given in species.items()}
+
+    @field_validator("residual_trees", mode="before")
+    @classmethod
+    def _number_seeds(cls, trees: Any) -> Any:
+        return number_seeds(trees)
 
     @field_validator("climate")
     @classmethod

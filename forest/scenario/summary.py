@@ -8,6 +8,8 @@ from forest.scenario.scenario import Scenario
 
 #: Acts that are named one by one.
 _MOST_ACTS = 6
+#: Residual trees that are named one by one.
+_MOST_RESIDUAL = 6
 #: Storms that are named one by one.
 _MOST_STORMS = 6
 
@@ -46,6 +48,7 @@ def summary(scenario: Scenario) -> list[tuple[str, str]]:
         ("regeneration", _regeneration(scenario)),
         ("wind", _wind(scenario)),
         ("obstacles", str(len(scenario.obstacles)) if scenario.obstacles else "none"),
+        ("residual trees", _residual(scenario)),
         ("acts", _acts(scenario)),
         ("seed", str(scenario.seed)),
         ("tables", ", ".join(scenario.output.tables) or "none"),
@@ -105,6 +108,14 @@ def _wind(scenario: Scenario) -> str:
     if wind.yearly is not None:
         parts.append(f"every year about {wind.yearly.mode_m_s:g} m/s")
     return ", ".join(parts) or "no storms"
+
+
+def _residual(scenario: Scenario) -> str:
+    """Name the residual trees, or tell how many they are."""
+    trees = scenario.residual_trees
+    if len(trees) > _MOST_RESIDUAL:
+        return str(len(trees))
+    return ", ".join(f"{t.name} ({t.species}, {t.height_m:g} m)" for t in trees) or "none"
 
 
 def _acts(scenario: Scenario) -> str:

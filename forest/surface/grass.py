@@ -101,7 +101,7 @@ def grow_grass(
     *,
     seed: int = 0,
     tint: RGB = (1.0, 1.0, 1.0),
-    light_at: Callable[[_Array], _Array] | None = None,
+    shade_at: Callable[[_Array], _Array] | None = None,
 ) -> Blades:
     """Give the blades that the camera sees.
 
@@ -118,7 +118,7 @@ def grow_grass(
     seed : int
     tint : tuple of float
         Factor on all colours, by which seasons differ.
-    light_at : callable, optional
+    shade_at : callable, optional
         Whether points (n, 3) lie in the shade, 0 to 1; in full light unless given.
 
     Notes
@@ -145,8 +145,8 @@ def grow_grass(
     for which, kind in kinds.items():
         # A cell deals as many blades as the densest kind needs; others take their share of them.
         here = np.flatnonzero((code == which) & (number < kind.per_m2 * _CELL_M**2 * share[cell]))
-        if light_at is not None and len(here):
-            shaded = np.asarray(light_at(foot[here]), np.float64)
+        if shade_at is not None and len(here):
+            shaded = np.asarray(shade_at(foot[here]), np.float64)
             light[here] = 1.0 - (1.0 - _SHADED) * shaded
         outer = np.clip((1.0 - distance[cell[here]] / _REACH_M) / (1.0 - _FADES), 0.05, 1.0)
         height = kind.height_m * outer * (1.0 + kind.height_variation * (2.0 * look[here, 0] - 1.0))

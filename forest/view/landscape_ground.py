@@ -15,8 +15,8 @@ from forest.view.scenery.scenery import RGB, Scenery
 GRASS_TINT: dict[str, RGB] = {
     "spring": (0.95, 1.10, 0.85),
     "summer": (1.0, 1.0, 1.0),
-    "fall": (1.30, 1.00, 0.85),
-    "winter": (1.30, 0.95, 1.00),
+    "fall": (1.12, 0.92, 0.95),
+    "winter": (1.02, 0.80, 1.15),
 }
 
 _FIRST_M = 0.10  # step of the ground's mesh at the eye's foot

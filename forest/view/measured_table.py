@@ -87,3 +87,13 @@ def _table(first: str, *headings: str) -> Table:
     for heading in headings:
         table.add_column(heading, justify="right", vertical="bottom")
     return table
+
+
+def residual_lines(rows: pd.DataFrame) -> list[str]:
+    """Say of each residual tree of a year, rows of `/residual`, what it measures."""
+    return [
+        f"residual tree {tree.name} ({tree.species}, {tree.status}): {tree.height_m:.1f} m, "
+        f"dbh {tree.dbh_cm:.1f} cm, crown from {tree.crown_base_m:.1f} m, "
+        f"radius {tree.crown_radius_m:.1f} m, {tree.leaf_area_m2:.0f} m2 of leaves"
+        for tree in rows.itertuples()
+    ]

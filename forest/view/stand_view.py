@@ -101,7 +101,7 @@ class StandView:
             camera,
             seed=scenery.seed,
             tint=GRASS_TINT[scenery.season],
-            light_at=self.shadows.shaded if self.shadows else None,
+            shade_at=self.shadows.shaded if self.shadows else None,
         )
         n, k = blades.vertices.shape[:2]
         points = blades.vertices.reshape(-1, 3).astype(np.float64)

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from analysis import plates
-from forest.parametric.parameters import load_parameters, parametric_names
+from forest.species.parametric import load_parameters, parametric_names
 
 
 def test_every_species_is_shown() -> None:

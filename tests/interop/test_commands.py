@@ -53,7 +53,7 @@ def test_a_table(run_file: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "nothing to export; expected --table NAME or --tree ID"),
+        ((), "nothing to export; expected --table NAME, --tree ID or --residual NAME"),
         (("--table", "stand", "--tree", "1"), "--table and --tree exclude each other"),
         (("--table", "stand", "--year", "2005"), "--year goes with --tree"),
         (("--table", "stand", "--as", "fsv"), "no form 'fsv' for a table of stand; did you mean"),

@@ -81,7 +81,7 @@ def test_kinds_shade_and_view() -> None:
     camera = look((0.0, 0.0, 1.7), (0.0, 9.0, 0.0))
     flat = HeightField.flat()
     lit = grown(GRASSES["meadow"], camera, flat)
-    dark = grown(GRASSES["meadow"], camera, flat, light_at=lambda p: np.ones(len(p)))
+    dark = grown(GRASSES["meadow"], camera, flat, shade_at=lambda p: np.ones(len(p)))
     assert dark.colour.mean() < 0.7 * lit.colour.mean()
     assert len(grow_grass({2: GRASSES["lawn"]}, everywhere, flat, camera).colour) == 0
     up = look((0.0, 0.0, 20.0), (0.0, 1.0, 40.0))

@@ -130,9 +130,11 @@ def test_a_picture_shows_sky_trees_and_grass(scene: Path, tmp_path: Path) -> Non
 
 def test_shadows_haze_and_seasons_show(scene: Path) -> None:
     built = load_scenery(scene)
+    low = replace(built, sun_azimuth_deg=0.0, sun_elevation_deg=25.0)  # shadows fall to the eye
+    dark = StandView(low).picture().astype(float)
+    sunny = StandView(low, shadows=False).picture().astype(float)
+    assert sunny.mean() > dark.mean() + 1.0
     plain = StandView(built).picture().astype(float)
-    sunny = StandView(built, shadows=False).picture().astype(float)
-    assert sunny.mean() > plain.mean() + 0.5
     hazy = replace(built, haze=replace(built.haze, visibility_m=15.0))
     veiled = StandView(hazy).picture().astype(float)
     assert veiled[40:60].std() < 0.8 * plain[40:60].std()
@@ -164,9 +166,24 @@ def test_living_trees_of_a_year_stand_at_their_places(run_file: Path) -> None:
     assert bare.notes == built.notes
 
 
+def test_sample_trees_of_a_run_are_spread_like_others(scene: Path, run_file: Path) -> None:
+    with open_run(run_file) as run:
+        sample = run.samples[0]
+        skeleton = run.skeleton(sample, 2008)
+    row = f'run = "{run_file}"\nsample = {sample}\nper'
+    text = SCENE.replace('species = "lilac"\nmost_leaves = 900\nper', row)
+    built = build_scenery(SceneFile.from_toml(text), scene.parent)
+    height = skeleton.end[:, 2].max() - skeleton.start[0, 2]
+    assert built.heights[0] == pytest.approx(height)
+    assert (built.instances.model[:-1] == 0).all()
+    with pytest.raises(InputError, match=r"trees\[0\].run: tree 999 is no sample tree"):
+        wrong = SceneFile.from_toml(text.replace(f"sample = {sample}", "sample = 999"))
+        build_scenery(wrong, scene.parent)
+
+
 def test_without_shapes_parametric_trees_stand_in(tmp_path: Path) -> None:
-    from forest.parametric.parameters import parametric_names
     from forest.species import species_names
+    from forest.species.parametric import parametric_names
 
     assert set(STAND_INS) == set(species_names())
     assert set(STAND_INS.values()) <= set(parametric_names())

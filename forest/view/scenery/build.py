@@ -17,7 +17,7 @@ from forest.surface.feature_map import FeatureMap, Spreading, read_feature_map, 
 from forest.surface.grass import GRASSES, Grass
 from forest.surface.instances import Instances, Model
 from forest.surface.terrain import HeightField, read_heights
-from forest.view.scenery.colours import colours_of
+from forest.view.scenery.colours import colours_of, parametric_colours
 from forest.view.scenery.file import GrassTable, SceneFile, Trees
 from forest.view.scenery.scenery import Haze, Scenery, Viewpoint
 
@@ -115,10 +115,13 @@ def grow_light(parameters: Parameters, seed: int, most_leaves: int) -> Parametri
 def parametric_model(tree: ParametricTree, looks_like: str = "") -> tuple[Model, float]:
     """Make the model of a parametric tree, and give its height, m.
 
-    `looks_like` names the species whose colours it takes, if not its own.
+    `looks_like` names the simulated species whose colours it takes instead of its own.
     """
     parameters = tree.parameters
-    bark, foliage = colours_of(looks_like or parameters.name, evergreen=parameters.evergreen)
+    if looks_like:
+        bark, foliage = colours_of(looks_like, evergreen=parameters.evergreen)
+    else:
+        bark, foliage = parametric_colours(parameters)
     model = Model.of(
         tree.skeleton(), tree.leaves, evergreen=parameters.evergreen, bark=bark, foliage=foliage
     )
@@ -188,7 +191,7 @@ def _stand(
     scales: list[_Array] = []
     if features is not None and scene.trees:
         variants = [
-            np.array(_variants(row, folder, f"{where}: trees[{number}]", stock))
+            np.array(_variants(row, folder, where, f"trees[{number}]", stock))
             for number, row in enumerate(scene.trees)
         ]
         kinds = [
@@ -227,12 +230,12 @@ def _stand(
     )
 
 
-def _variants(row: Trees, folder: Path, where: str, stock: Stock) -> list[int]:
+def _variants(row: Trees, folder: Path, where: str, key: str, stock: Stock) -> list[int]:
     """Make the models of one kind of trees."""
     if row.species is None:
-        with _told(where, "run"):
+        with _told(where, f"{key}.run"):
             return [stock.number((row.run, row.sample, row.year), lambda: _sample(row, folder))]
-    with _told(where, "species"):
+    with _told(where, f"{key}.species"):
         parameters = _parameters(row.species, folder)
     return [
         stock.number(

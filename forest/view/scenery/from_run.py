@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from forest.trees.skeleton import Skeleton
 from forest.view.scenery.build import Stock, grow_light, parametric_model
 from forest.view.scenery.colours import colours_of
 from forest.view.scenery.scenery import Scenery
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Parametric species that stand in for simulated ones of which no shape is on record.
 STAND_INS: Mapping[str, str] = {
@@ -77,7 +80,8 @@ def scenery_of_run(
 
     A tree whose shape is on record, among the sample trees or in `shapes`, stands as it is. Others
     take the shape of their species that is nearest in height, scaled to their own. If there is
-    none, a parametric species stands in (`STAND_INS`), scaled likewise.
+    none, a parametric species stands in (`STAND_INS`), scaled likewise. Residual trees that stand
+    are put up in their own form.
 
     Parameters
     ----------
@@ -119,12 +123,17 @@ def scenery_of_run(
             seed = int(ids[k]) % _STAND_IN_SEEDS
             model[k] = _stand_in(name, seed, run.scenario.species[name].group, stock)
             stand_in += 1
+    model_of_residual, residual = _residual(run, year, stock)
+    model = np.concatenate((model, model_of_residual))
+    heights = np.concatenate((heights, residual["height_m"].to_numpy(np.float64)))
+    as_it_is = np.concatenate((as_it_is, np.zeros(len(residual), np.bool_)))
+    spots = np.concatenate([t[["x_m", "y_m"]].to_numpy(np.float64) for t in (trees, residual)])
     sizes = np.array(stock.heights)
-    scale = np.where(as_it_is, 1.0, heights / sizes[model]) if len(trees) else np.empty(0)
+    scale = np.where(as_it_is, 1.0, heights / sizes[model]) if len(model) else np.empty(0)
     width, depth = run.scenario.plot.size_m
     shift = (np.arange(tile) - tile // 2).astype(np.float64)
     places = [
-        np.column_stack((trees["x_m"] + i * width, trees["y_m"] + j * depth, np.zeros(len(trees))))
+        np.column_stack((spots[:, 0] + i * width, spots[:, 1] + j * depth, np.zeros(len(spots))))
         for i in shift
         for j in shift
     ]
@@ -197,6 +206,30 @@ def _shapes_on_record(
                 _Shape(stock.heights[number], number, skeleton.tree_id)
             )
     return known
+
+
+def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.DataFrame]:
+    """Give the models of the residual trees that stand in a year, and their rows of `/residual`."""
+    import pandas as pd
+
+    if "residual" not in run.tables:
+        return np.empty(0, np.int64), pd.DataFrame(columns=["x_m", "y_m", "height_m"])
+    rows = run.read("residual", years=(year, year))
+    rows = rows[rows["status"] == "standing"]
+    number = []
+    for one in rows["residual_id"]:
+        tree = run.scenario.residual_trees[one - 1]
+        assert tree.parameters is not None  # filled in when the scenario was read
+        parameters, seed = tree.parameters, tree.seed
+        number.append(
+            stock.number(
+                ("residual", parameters, seed),
+                lambda p=parameters, s=seed: parametric_model(  # type: ignore[misc]
+                    grow_light(p, s, _MOST_LEAVES)
+                ),
+            )
+        )
+    return np.array(number, np.int64), rows
 
 
 def _stand_in(species: str, seed: int, group: str, stock: Stock) -> int:

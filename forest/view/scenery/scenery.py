@@ -18,8 +18,8 @@ from forest.surface.terrain import HeightField
 RGB = tuple[float, float, float]
 
 _EYE_HEIGHT_M = 1.7
-_BACK = 1.1  # an eye that stands before the edge is this far from it, per height of the trees
-_MOST_BACK_M = 45.0
+_BACK = 1.6  # an eye that stands before the edge is this far from it, per height of the trees
+_MOST_BACK_M = 60.0
 
 #: Where the day's haze ends and what it looks like.
 HAZE_COLOUR: RGB = (0.78, 0.84, 0.90)
@@ -132,7 +132,7 @@ class Scenery:
         top = float(np.quantile(heights, 0.9)) if len(heights) else 2.0
         back = min(_BACK * top, _MOST_BACK_M)
         eye = self.view.eye or (0.5 * (x0 + x1), y0 - back, _EYE_HEIGHT_M)
-        towards = self.view.towards or (0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.4 * top)
+        towards = self.view.towards or (0.5 * (x0 + x1), y0 + min(back, 0.5 * (y1 - y0)), 0.5 * top)
         if np.allclose(eye, towards):
             raise InputError("the eye looks at itself", expected="two different points")
         return Camera(
