@@ -61,7 +61,7 @@ def test_print_makes_a_notch_where_the_reading_does_not() -> None:
 def test_blend_fades_with_the_distance_from_its_joint() -> None:
     blend = blend_of(branching(45.0))
     reach = float(blend.limbs.joints.reach[0])
-    assert reach == pytest.approx(2.0 * 0.1 / np.sin(np.deg2rad(22.5)))
+    assert reach == pytest.approx((0.1 + 0.06) / np.sin(np.deg2rad(22.5)))
     above = surface_at(blend, (0.0, 0.0, 1.0 + reach), (1.0, 0.0, 0.0), 0.2)
     assert above == pytest.approx(0.1, abs=1e-9)
     plain = 0.1 / np.sin(np.deg2rad(22.5))  # where equal limbs would part

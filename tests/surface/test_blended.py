@@ -41,8 +41,8 @@ def sound(mesh: Mesh) -> None:
     assert mesh.triangles.min() == 0 and mesh.triangles.max() == len(mesh.points) - 1
 
 
-@settings(max_examples=10, deadline=None)
-@given(st.integers(0, 10_000), st.integers(0, 4), st.sampled_from([0.008, 0.015, 0.03]))
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10_000), st.integers(0, 4), st.sampled_from([0.015, 0.03]))
 def test_trees_are_closed_balls(seed: int, limbs: int, cell_m: float) -> None:
     skeleton = random_tree(seed, limbs)
     mesh = blended(skeleton, cell_m=cell_m)
@@ -53,13 +53,13 @@ def test_trees_are_closed_balls(seed: int, limbs: int, cell_m: float) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::forest.surface.blend.CrossingWarning")
-@settings(max_examples=8, deadline=None)
-@given(st.integers(0, 10_000), st.integers(2, 12))
+@settings(max_examples=5, deadline=None)
+@given(st.integers(0, 10_000), st.integers(2, 8))
 def test_whatever_crosses_is_closed(seed: int, n: int) -> None:
     skeleton = bush(seed, n)
     if np.all(skeleton.length <= 1e-9):
         return
-    sound(blended(skeleton, cell_m=0.02 if skeleton.radius.max() > 0.04 else None))
+    sound(blended(skeleton, cell_m=0.5 * skeleton.radius.max()))
 
 
 def test_volume_goes_to_that_of_the_cone() -> None:
@@ -73,9 +73,9 @@ def test_volume_goes_to_that_of_the_cone() -> None:
 
 def test_joint_has_no_crease() -> None:
     skeleton = branching(55.0)
-    smooth = blended(skeleton, cell_m=0.006, flare=None, cells_in_radius=10.0)
+    smooth = blended(skeleton, cell_m=0.008, flare=None, cells_in_radius=8.0)
     limb = dataclasses.replace(skeleton, parent=np.array([-1, 0, -1], np.int32))
-    plain = blended(limb, cell_m=0.006, flare=None, cells_in_radius=10.0)  # shares no joint
+    plain = blended(limb, cell_m=0.008, flare=None, cells_in_radius=8.0)  # shares no joint
     assert greatest_turn(smooth, 0.8, 1.6) < 30.0
     assert greatest_turn(plain, 0.8, 1.6) > 50.0
 
@@ -112,7 +112,7 @@ def test_thin_limbs_are_tubes_welded_in() -> None:
     skeleton = random_tree(5, 4)
     coarse = blended(skeleton, cell_m=0.03)
     assert coarse.genus().tolist() == [0]
-    fine = blended(skeleton, cell_m=0.006)
+    fine = blended(skeleton, cell_m=0.01)
     assert coarse.volume == pytest.approx(fine.volume, rel=0.05)
     thin = coarse.data["axis"][coarse.triangles[:, 0]] > 0
     assert np.sum(thin) < 0.1 * np.sum(fine.data["axis"][fine.triangles[:, 0]] > 0)
