@@ -148,6 +148,9 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
+    whole = f"blended, cells of 1 cm, {skin['blended_triangles']:,} triangles, s"
+    yield Line(whole, (f"{skin['blended_s']:.1f}", f"{skin['blended_cpu_s']:.1f}"))
+    yield Line("most memory held, GiB", (f"{skin['blended_gib']:.1f}",))
     yield from _bark_lines(result["bark"])
     starts = result["starts"]
     yield Line("Start", ())
