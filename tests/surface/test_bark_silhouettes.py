@@ -160,5 +160,7 @@ def test_fractures_that_met_head_on_are_one_opening() -> None:
         ends = outlines.half[rows, :2]
         assert ends.min() >= 0.0
         assert ends.max(axis=1).min() > 0.0  # no piece is nothing
-    tips = outlines.half[: outlines.offsets[-2], :2] == 0.0  # without the interval that is there twice
+    tips = (
+        outlines.half[: outlines.offsets[-2], :2] == 0.0
+    )  # without the interval that is there twice
     assert tips.sum() < 2 * len(bark.fractures.origin)
