@@ -171,11 +171,13 @@ def joint(field: Any, j: Any, x: Any, y: Any, z: Any) -> Any:
         return np.inf, np.inf, 0.0
     soft = _SOFT * joints.thin[j]
     b = _side(field.cones, joints.first[j, 1], joints.last[j, 1], soft, x, y, z)
-    share *= fall_off(max(b[0], 0.0) / joints.near[j])
+    if not field.printed[0]:
+        share *= fall_off(max(b[0], 0.0) / joints.near[j])
     if share <= 0.0:
         return np.inf, np.inf, 0.0
     a = _side(field.cones, joints.first[j, 0], joints.last[j, 0], soft, x, y, z)
-    share *= fall_off(max(a[0], 0.0) / joints.near[j])
+    if not field.printed[0]:
+        share *= fall_off(max(a[0], 0.0) / joints.near[j])
     if share <= 0.0:
         return np.inf, np.inf, 0.0
     plain = min(a[0], b[0])
@@ -364,7 +366,7 @@ class Blend:
         high = np.maximum(cones.start, cones.end) + wide
         starts = joints.place[:-1]
         if len(starts):
-            lower, upper = _joint_boxes(joints, low, high)
+            lower, upper = _joint_boxes(joints, low, high, printed)
             place_low = np.minimum.reduceat(lower, starts, axis=0)
             place_high = np.maximum.reduceat(upper, starts, axis=0)
         else:
@@ -403,10 +405,12 @@ class Blend:
         return OnLimb(cones.axis[which], cones.along[which] + t * length, radius, which)
 
 
-def _joint_boxes(joints: Joints, low: _Floats, high: _Floats) -> tuple[_Floats, _Floats]:
+def _joint_boxes(
+    joints: Joints, low: _Floats, high: _Floats, printed: bool
+) -> tuple[_Floats, _Floats]:
     """Boxes in which pairs of limbs can blend: in reach of the joint, and near either limb."""
     lower, upper = joints.point - joints.reach[:, None], joints.point + joints.reach[:, None]
-    for j in range(len(joints.reach)):
+    for j in range(0 if printed else len(joints.reach)):
         for k in range(2):
             own = slice(joints.first[j, k], joints.last[j, k])
             lower[j] = np.maximum(lower[j], low[own].min(axis=0) - joints.near[j])
