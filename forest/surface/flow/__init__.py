@@ -1,0 +1,1 @@
+"""Particles on the surface of a tree: the grain of its bark."""
