@@ -24,6 +24,8 @@ _Floats = NDArray[np.float64]
 
 _CHUNKS = 64  # fixed, so that nothing depends on the number of threads
 _TINY = 1e-12
+#: A point so near to the surface is on it, m.
+_CLOSE = 1e-8
 #: How far from the nearest foot others count, times the thinner radius: feet do not jump at bends.
 _SOFT = 0.1
 #: Step of differences for the gradient, m.
@@ -252,9 +254,11 @@ def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: 
     """Move a point onto the surface by Newton steps of at most `most` metres each."""
     f, which = value(field, x, y, z, hint)
     for _ in range(steps):
-        if abs(f) < 1e-9:
+        if abs(f) < _CLOSE:
             break
-        gx, gy, gz = gradient(field, x, y, z, which)
+        gx = (value(field, x + _STEP, y, z, which)[0] - f) / _STEP
+        gy = (value(field, x, y + _STEP, z, which)[0] - f) / _STEP
+        gz = (value(field, x, y, z + _STEP, which)[0] - f) / _STEP
         square = max(gx * gx + gy * gy + gz * gz, 0.01)
         step = f / square
         size = abs(step) * np.sqrt(gx * gx + gy * gy + gz * gz)
