@@ -1,12 +1,14 @@
 """Residual trees: parametric trees that stand in the stand, shade, take room and can be felled.
 
-A tree is grown once from the scenario, scaled to its height and dbh, and stays as it is.
+A tree is grown from the scenario, scaled to its height and dbh, and stays as it is. Once it is
+gathered into voxels and points, its measures are kept and its shape is let go, since an old oak has
+a million parts; the shape is grown again where it is asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from forest.measure.crowns import crown_of
 from forest.measure.stem import stems_of_skeletons
 from forest.parametric import ParametricTree, grow
 from forest.record.schema import RESIDUAL_STATUS
+from forest.scenario.residual import MOST_CROWN_LAI
 from forest.trees.leaves import Leaves
 from forest.trees.skeleton import Skeleton
 
@@ -27,6 +30,10 @@ if TYPE_CHECKING:
 
     from forest.scenario import Scenario
     from forest.scenario.residual import ResidualTree as Wanted
+    from forest.species.parametric import Parameters
+
+#: Internodes and leaves of all residual trees of a scenario: some half a minute to gather.
+MOST_PARTS = 50_000_000
 
 _BREAST_HEIGHT_M = 1.3
 
@@ -39,11 +46,8 @@ class ResidualTree:
     ----------
     name, species : str
         Its name, and that of its parametric species.
-    skeleton : Skeleton
-        Its shape in the plot's coordinates; its radius is taken as that over bark. Its `tree_id` is
-        below 0, its number with a minus, so that no simulated tree has it.
-    leaves : Leaves
-        Its leaves, likewise; their areas add up to `leaf_area_m2`.
+    place_m : tuple of float
+        Place of the stem base, m.
     height_m : float
         Height of the highest tip.
     dbh_cm : float
@@ -57,8 +61,7 @@ class ResidualTree:
 
     name: str
     species: str
-    skeleton: Skeleton
-    leaves: Leaves
+    place_m: tuple[float, float]
     height_m: float
     dbh_cm: float
     crown_base_m: float
@@ -66,14 +69,29 @@ class ResidualTree:
     leaf_area_m2: float
     stem_volume_m3: float
 
-    @property
-    def place_m(self) -> tuple[float, float]:
-        """Place of the stem base, m."""
-        x, y, _ = self.skeleton.start[0]
-        return float(x), float(y)
+
+@dataclass(frozen=True)
+class GrownResidual(ResidualTree):
+    """A residual tree with its shape.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+        Its shape in the plot's coordinates; its radius is taken as that over bark. Its `tree_id` is
+        below 0, its number with a minus, so that no simulated tree has it.
+    leaves : Leaves
+        Its leaves, likewise; their areas add up to `leaf_area_m2`.
+    """
+
+    skeleton: Skeleton
+    leaves: Leaves
+
+    def measures(self) -> ResidualTree:
+        """Give the tree without its shape."""
+        return ResidualTree(*(getattr(self, field.name) for field in fields(ResidualTree)))
 
 
-def grow_residual(wanted: Wanted, number: int = 1) -> ResidualTree:
+def grow_residual(wanted: Wanted, number: int = 1) -> GrownResidual:
     """Grow the tree that a scenario's table describes.
 
     The parametric tree of its species and seed is scaled to its height, alike in all directions;
@@ -91,19 +109,34 @@ def grow_residual(wanted: Wanted, number: int = 1) -> ResidualTree:
     InputError
         If the species gives no tree of that height, dbh or leaf area.
     """
-    where = f"residual_trees[{number - 1}]"
+    return _scaled(_form(wanted, number), wanted, number)
+
+
+def _form(wanted: Wanted, number: int) -> ParametricTree:
+    """Grow the form of a tree, of any size."""
+    where = f"residual_trees[{number - 1}].species"
     assert wanted.parameters is not None  # filled in when the scenario is read
     try:
         form = grow(wanted.parameters, wanted.seed)
     except InputError as error:
-        raise InputError(str(error), where=f"{where}.species") from None
-    height = float(form.nodes.position[:, 2].max(initial=0.0))
-    if not (np.isfinite(form.nodes.position).all() and height > 0.0):
+        raise InputError(str(error), where=where) from None
+    if not (np.isfinite(form.nodes.position).all() and _height(form) > 0.0):
         raise InputError(
             f"'{wanted.species}' gives no tree that stands",
-            where=f"{where}.species",
+            where=where,
             expected="parameters of a tree with a height",
         )
+    return form
+
+
+def _height(form: ParametricTree) -> float:
+    return float(form.nodes.position[:, 2].max(initial=0.0))
+
+
+def _scaled(form: ParametricTree, wanted: Wanted, number: int) -> GrownResidual:
+    """Give a form the size and the place of a tree."""
+    where = f"residual_trees[{number - 1}]"
+    height = _height(form)
     skeleton = _placed(form, wanted, wanted.height_m / height, number)
     stems = stems_of_skeletons([skeleton], 0.0)
     dbh_cm = 100.0 * float(stems.diameter_at(_BREAST_HEIGHT_M)[0])
@@ -118,18 +151,24 @@ def grow_residual(wanted: Wanted, number: int = 1) -> ResidualTree:
         stems = stems_of_skeletons([skeleton], 0.0)
         dbh_cm = wanted.dbh_cm
     crown = crown_of(skeleton)
-    area = wanted.leaf_area_m2
-    if area is None:
-        area = wanted.crown_lai * float(np.nan_to_num(crown.projection_m2[0]))
+    below = float(np.nan_to_num(crown.projection_m2[0]))
+    area = wanted.crown_lai * below if wanted.leaf_area_m2 is None else wanted.leaf_area_m2
     if area > 0.0 and not len(form.leaves.stem):
         raise InputError(
             f"'{wanted.species}' bears no leaves",
             where=f"{where}.leaf_area_m2",
             expected="0, or another species",
         )
-    return ResidualTree(
+    if area > MOST_CROWN_LAI * below:
+        raise InputError(
+            f"{area:g} m2 of leaves stand over {below:.3g} m2 of ground below the crown",
+            where=f"{where}.leaf_area_m2",
+            expected=f"at most {MOST_CROWN_LAI:g} times that, {MOST_CROWN_LAI * below:.3g} m2",
+        )
+    return GrownResidual(
         name=wanted.name,
         species=wanted.species,
+        place_m=(wanted.x_m, wanted.y_m),
         skeleton=skeleton,
         leaves=_leaves(form, wanted, wanted.height_m / height, area),
         height_m=wanted.height_m,
@@ -184,17 +223,18 @@ class ResidualTrees:
     """
 
     def __init__(self, scenario: Scenario, surroundings: Surroundings) -> None:
-        wanted = scenario.residual_trees
-        self.trees = tuple(grow_residual(one, k + 1) for k, one in enumerate(wanted))
+        wanted = self._wanted = scenario.residual_trees
         self._surroundings = surroundings
         self._start_year = scenario.start_year
         self._felled_step = np.zeros(len(wanted), np.int32)  # 0 while it stands
         species = list(dict.fromkeys(one.species for one in wanted))
         self._species = np.array([species.index(one.species) for one in wanted], np.int16)
-        self._parts = [
-            _standing(tree, scenario, one.like, surroundings.voxel_m)
-            for tree, one in zip(self.trees, wanted, strict=True)
-        ]
+        gathered: dict[int, tuple[ResidualTree, Standing]] = {}
+        for k, tree in _grow_all(wanted):
+            standing = _standing(tree, scenario, wanted[k].like, surroundings.voxel_m)
+            gathered[k] = tree.measures(), standing
+        self.trees = tuple(gathered[k][0] for k in range(len(wanted)))
+        self._parts = [gathered[k][1] for k in range(len(wanted))]
         self._tell()
 
     def __len__(self) -> int:
@@ -243,14 +283,15 @@ class ResidualTrees:
         self._tell()
 
     def skeleton(self, name: str) -> Skeleton:
-        """Give the shape of a tree that stands.
+        """Grow the shape of a tree that stands once more.
 
         Raises
         ------
         InputError
             If there is no such tree, or it was felled.
         """
-        return self.trees[self.row_of(name, "Stand.residual")].skeleton
+        row = self.row_of(name, "Stand.residual")
+        return grow_residual(self._wanted[row], row + 1).skeleton
 
     @property
     def table(self) -> pd.DataFrame:
@@ -300,7 +341,26 @@ class ResidualTrees:
         self._tell()
 
 
-def _standing(tree: ResidualTree, scenario: Scenario, like: str, voxel_m: float) -> Standing:
+def _grow_all(wanted: Sequence[Wanted]) -> Iterator[tuple[int, GrownResidual]]:
+    """Grow the trees one by one, in the order of their forms: each form is grown once."""
+    alike: dict[tuple[Parameters | None, int], list[int]] = {}
+    for k, one in enumerate(wanted):
+        alike.setdefault((one.parameters, one.seed), []).append(k)
+    parts = 0
+    for rows in alike.values():
+        form = _form(wanted[rows[0]], rows[0] + 1)
+        parts += len(rows) * (len(form.nodes.z) + len(form.leaves.stem))
+        if parts > MOST_PARTS:
+            raise InputError(
+                f"the trees have more than {MOST_PARTS:,} internodes and leaves in all",
+                where="residual_trees",
+                expected="fewer trees, or species with fewer branches and leaves",
+            )
+        for k in rows:
+            yield k, _scaled(form, wanted[k], k + 1)
+
+
+def _standing(tree: GrownResidual, scenario: Scenario, like: str, voxel_m: float) -> Standing:
     """Tell how a tree shades and takes room, by the measure of a species of the scenario."""
     species = scenario.species[like] if like else scenario.species_list[0]
     shape, leaves = tree.skeleton, tree.leaves

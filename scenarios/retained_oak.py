@@ -23,6 +23,8 @@ PLOTS = {
     "no oak": ("acts=[]", "residual_trees=[]"),
 }
 COLOURS = {"oak felled": "#c0392b", "oak kept": "#2c3e50", "no oak": "#95a5a6"}
+#: The same tree of two plots is drawn so far apart, m.
+_APART_M = 0.22
 #: Growth is told over so many years.
 GROWTH_YEARS = 4
 
@@ -81,18 +83,25 @@ def draw(plots: dict[str, pd.DataFrame], scenario: forest.Scenario, felled: int,
     last = scenario.calendar[-1]
     oak = forest.Stand(scenario).residual.trees[0]
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.2))
-    for axis, year in zip(axes, (felled - 1, last), strict=False):
-        for name, trees in plots.items():
-            now = trees[trees["year"] == year]
-            axis.scatter(now["from_oak_m"], now["height_m"], s=9, color=COLOURS[name], label=name)
-        axis.axvspan(0.0, oak.crown_radius_m, color="#27ae60", alpha=0.15, lw=0)
+    # Until the felling the plots that have an oak are one: its dots would lie on each other.
+    before = {"oak kept": "oak, both plots", "no oak": "no oak"}
+    after = {name: name for name in ("oak kept", "no oak", "oak felled")}
+    for axis, year, groups in zip(axes, (felled - 1, last), (before, after), strict=False):
+        axis.axvspan(0.0, oak.crown_radius_m, color="#d9efe0", lw=0, zorder=0)
+        for k, (name, label) in enumerate(groups.items()):
+            now = plots[name][plots[name]["year"] == year]
+            beside = now["from_oak_m"] + _APART_M * (k - 0.5 * (len(groups) - 1))
+            axis.scatter(beside, now["height_m"], s=7, color=COLOURS[name], label=label)
         axis.set(title=f"{year}", xlabel="distance from the oak, m", ylabel="height of pines, m")
         axis.set(xlim=(0, None), ylim=(0, None))
-    axes[0].legend(fontsize=8, loc="lower right")
+        axis.legend(fontsize=8, loc="lower right")
     for name, trees in plots.items():
         near = trees[trees["from_oak_m"] < oak.crown_radius_m]
         height = near.pivot(index="tree_id", columns="year", values="height_m")
-        axes[2].plot(height.diff(axis=1).mean(), color=COLOURS[name], label=name)
+        growth = height.diff(axis=1).mean()
+        if name == "oak felled":
+            growth = growth[growth.index >= felled - 1]  # before, it is the plot whose oak is kept
+        axes[2].plot(growth, color=COLOURS[name], label=name)
     axes[2].axvline(felled - 0.5, color="0.5", ls=":")
     axes[2].set(
         title="pines under the crown",

@@ -13,7 +13,7 @@ from forest.cli.shared import last_shapes
 from forest.errors import ActError, InputError
 from forest.interop import read_simpleforest
 from forest.measure.stem import stems_of_skeletons
-from forest.parametric import load_parameters
+from forest.parametric import grow, load_parameters
 from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import open_run
 from forest.residual import grow_residual
@@ -81,6 +81,7 @@ def test_leaf_area_by_crown_or_as_given() -> None:
     ("given", "says"),
     [
         ({"species": "saguaro", "leaf_area_m2": 5.0}, "residual_trees[0].leaf_area_m2: 'saguaro'"),
+        ({"leaf_area_m2": 1e5}, "residual_trees[0].leaf_area_m2: 100000 m2 of leaves stand over"),
         ({"height_m": 1.0, "dbh_cm": 9.0}, "residual_trees[0].dbh_cm: its stem does not reach"),
         (
             {"parameters": load_parameters("quaking_aspen").with_changes(["1Branches=5000"])},
@@ -166,6 +167,45 @@ def test_it_stands_in_python_until_it_is_felled() -> None:
     assert stand.step().tables["residual"]["status"].tolist() == [1, 0]
 
 
+def test_its_shape_is_grown_where_it_is_asked_for() -> None:
+    """A stand keeps measures; the shape grown again is that of the tree that shades."""
+    stand = Stand(tiny(TREES))
+    for number, wanted in enumerate(stand.scenario.residual_trees, start=1):
+        alone = grow_residual(wanted, number)
+        kept = stand.residual.trees[number - 1]
+        assert kept == alone.measures()
+        assert not hasattr(kept, "leaves")
+        again = stand.residual.skeleton(wanted.name)
+        assert again.tree_id == -number
+        np.testing.assert_array_equal(again.end, alone.skeleton.end)
+        np.testing.assert_array_equal(again.radius, alone.skeleton.radius)
+
+
+def test_a_form_is_grown_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trees of one species and seed share it, whatever their sizes; others do not."""
+    import forest.residual as room
+
+    grown = []
+    monkeypatch.setattr(room, "grow", lambda p, seed: grown.append(seed) or grow(p, seed))
+    row = '{{name="t{}", x_m={}, y_m=5, species="quaking_aspen", height_m={}, seed={}}}'
+    seeds = [7, 8, 7]
+    trees = ", ".join(row.format(k, k, 4 + k, seed) for k, seed in enumerate(seeds))
+    stand = Stand(tiny(f"residual_trees=[{trees}]"))
+    assert grown == [7, 8]
+    assert stand.residual.table.name.tolist() == ["t0", "t1", "t2"]
+    assert stand.residual.table.height_m.tolist() == [4.0, 5.0, 6.0]
+    apart = stand.residual.table.crown_radius_m / stand.residual.table.height_m
+    assert apart[0] == pytest.approx(apart[2], rel=1e-5)
+    assert apart[0] != pytest.approx(apart[1], rel=1e-3)
+
+
+def test_more_than_can_be_gathered_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("forest.residual.MOST_PARTS", 30_000)  # an aspen has 29,000 or so
+    Stand(tiny("residual_trees=[" + ASPEN + "]"))
+    with pytest.raises(InputError, match=r"residual_trees: the trees have more than 30,000"):
+        Stand(tiny(TREES))
+
+
 def test_an_act_on_what_is_gone_stops_the_run() -> None:
     stand = Stand(tiny(TREES, FELL))
     steps(stand, 2)
@@ -233,7 +273,7 @@ def test_without_them_nothing_is_written(tmp_path: Path) -> None:
 def test_a_file_of_ones_own_goes_into_the_run_file(tmp_path: Path) -> None:
     """The scenario is whole without the file, wherever it is read again."""
     form = load_parameters("quaking_aspen").with_changes(["1Branches=7"])
-    text = (Path(__file__).parents[1] / "forest/parametric/species/quaking_aspen.toml").read_text()
+    text = (Path(__file__).parents[1] / "forest/species/forms/quaking_aspen.toml").read_text()
     (tmp_path / "mine.toml").write_text(text.replace("branches = 50", "branches = 7"))
     table = '[[residual_trees]]\nname="a"\nx_m=1\ny_m=1\nspecies="mine.toml"\nheight_m=4\n'
     (tmp_path / "stand.toml").write_text(TOML + table)

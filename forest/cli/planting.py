@@ -8,18 +8,23 @@ from typing import Annotated
 import typer
 
 from forest.cli.shared import Overrides, check_targets
+from forest.cli.surfacing import MESH, working, write_parts
 
 
 def tree(
+    context: typer.Context,
     species: Annotated[
         str | None, typer.Argument(help="A parametric species, or a TOML file of one.")
     ] = None,
     to: Annotated[
-        Path | None, typer.Option("--to", help="A .vtp, .csv (cylinders), .png or .gif file.")
+        Path | None,
+        typer.Option("--to", help="Mesh .glb, .obj, .ply, .vtp; cylinders .csv; .png; .gif."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Each seed is another tree.")] = 0,
     changes: Overrides = None,
-    leaves: Annotated[bool, typer.Option(help="Whether leaves are drawn.")] = True,
+    leaves: Annotated[
+        bool | None, typer.Option("--leaves/--no-leaves", help="Default: with all but .ply.")
+    ] = None,
     season: Annotated[str, typer.Option(help="spring, summer, fall or winter.")] = "summer",
     time: Annotated[float, typer.Option(help="Moment of the wind, s.")] = 0.0,
     wind: Annotated[float, typer.Option(help="Wind speed, as in the paper.")] = 0.0,
@@ -43,19 +48,26 @@ def tree(
 
         forest tree quaking_aspen --seed 3 --to aspen.png
 
-        forest tree quaking_aspen --set 1Branches=30 --wind 8 --time 2 --to aspen.vtp
+        forest tree quaking_aspen --set 1Branches=30 --wind 8 --time 2 --to aspen.glb
 
         forest tree quaking_aspen --wind 8 --frames 24 --seconds 4 --to sway.gif
     """
     from forest.errors import InputError, nearest
     from forest.parametric import grow, load_parameters, parametric_names
 
+    given = _given(context)
     if list_ or species is None:
+        if given or (list_ and species is not None):
+            needs = f"--{given[0].replace('_', '-')} needs a species" if given else ""
+            raise InputError(
+                needs or "--list takes no species",
+                expected="forest tree SPECIES with options, or forest tree --list alone",
+            )
         for name in parametric_names():
             typer.echo(f"{name:<22} {load_parameters(name).common_name}")
         return
     if to is not None:
-        check_targets((to, (".vtp", ".csv", ".png", ".gif")), force=force)
+        check_targets((to, (*MESH, ".csv", ".png", ".gif")), force=force)
     seasons = ("spring", "summer", "fall", "winter")
     if season not in seasons:
         raise InputError(f"unknown season '{season}', {nearest(season, seasons)}")
@@ -63,6 +75,9 @@ def tree(
     moving = to is not None and to.suffix.lower() == ".gif"
     if moving and wind == 0.0 and gust == 0.0:
         raise InputError("nothing moves in a .gif", expected="--wind or --gust above 0")
+    only_moving = [name for name in given if name in ("frames", "seconds")]
+    if only_moving and not moving:
+        raise InputError(f"--{only_moving[0]} is for a .gif", expected="--to NAME.gif")
     still = grow(parameters, seed, readings=readings, quality=quality)  # type: ignore[arg-type]
     scale = time_scale if time_scale is not None else 2000.0 if moving else 1.0
     times = [time + k * seconds / frames for k in range(frames if moving else 1)]
@@ -79,11 +94,25 @@ def tree(
 
         write_simpleforest(one.skeleton(), to, overwrite=force)
         return
-    from forest.view.parametric_picture import draw_parametric, draw_sway, has_leaves, write_vtp
+    from forest.view.parametric_picture import draw_parametric, draw_sway, mesh_parts
+    from forest.view.tree_mesh import with_leaves
 
-    if to.suffix.lower() == ".vtp":
-        write_vtp(one, to, leaves=leaves and has_leaves(one, season), overwrite=force)
+    shown = with_leaves(to, leaves)
+    if to.suffix.lower() in MESH:
+        with working(f"the surface of {len(one.stems.level):,} stems"):
+            parts = mesh_parts(one, leaves=shown, season=season)
+        write_parts(parts, to, "texture", force)
     elif moving:
-        draw_sway(moments, to, seconds=seconds, leaves=leaves, season=season, overwrite=force)
+        draw_sway(moments, to, seconds=seconds, leaves=shown, season=season, overwrite=force)
     else:
-        draw_parametric(one, to, leaves=leaves, season=season)
+        draw_parametric(one, to, leaves=shown, season=season)
+
+
+def _given(context: typer.Context) -> list[str]:
+    """Name the options that stand on the command line, `--list` aside."""
+    return [
+        name
+        for name in context.params
+        if name not in ("species", "list_")
+        and getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
+    ]

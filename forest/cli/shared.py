@@ -96,4 +96,4 @@ def last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]
 
     stand = Stand.restore(scenario, *found)
     grown = [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
-    return stand.year, grown + [tree.skeleton for tree in stand.residual]
+    return stand.year, grown + [stand.residual.skeleton(tree.name) for tree in stand.residual]

@@ -24,6 +24,7 @@ from forest.parametric.stems import (
     grow_level,
     sections_of,
 )
+from forest.parametric.stretching import courses, stretched
 from forest.parametric.tree import Joints, Nodes, ParametricTree, Stems
 from forest.species.parametric import Parameters, load_parameters, pack
 from forest.trees.leaves import Leaves
@@ -354,8 +355,11 @@ def _assemble(
     nodes_before = np.cumsum([0, *(len(c.z) for _, c in grown.levels)], dtype=np.int32)[:-1]
     segments = [parameters.of_level(k).segments for k in range(len(stems))]
     stretch = parameters.z_scale + (2.0 * u - 1.0) * parameters.z_scale_variation
+    first = shoots.first + np.repeat(nodes_before, stems)
+    length, offset = shoots.length, shoots.offset
     if stretch != 1.0:
-        sections, leaves = _stretched(sections, leaves, stretch)
+        sections, leaves = stretched(sections, leaves, stretch)
+        length, offset = courses(shoots, sections, first)
     return ParametricTree(
         parameters=parameters,
         seed=seed,
@@ -364,11 +368,11 @@ def _assemble(
             np.repeat(np.arange(len(stems), dtype=np.int32), stems),
             shoots.parent,
             shoots.clone,
-            shoots.length,
+            length,
             shoots.radius,
-            shoots.first + np.repeat(nodes_before, stems),
+            first,
             shoots.nodes,
-            shoots.offset,
+            offset,
         ),
         nodes=Nodes(*sections),
         leaves=leaves,
@@ -380,14 +384,3 @@ def _assemble(
             leaf_node,
         ),
     )
-
-
-def _stretched(sections: Sections, leaves: Leaves, factor: float) -> tuple[Sections, Leaves]:
-    """Stretch the finished tree along z (ZScale); leaves keep their shape."""
-    along = np.array([1.0, 1.0, factor])
-    heading = sections.heading * along
-    heading /= np.linalg.norm(heading, axis=1, keepdims=True)
-    side = sections.side - heading * np.sum(sections.side * heading, axis=1, keepdims=True)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    sections = sections._replace(position=sections.position * along, heading=heading, side=side)
-    return sections, leaves._replace(position=leaves.position * along.astype(np.float32))

@@ -29,13 +29,14 @@ class Stems(NamedTuple):
     is_clone : bool (n,)
         Whether it split from a stem of its own level.
     length : float64 (n,)
-        Length of the whole course, m; a clone's is counted from the base of its first twin.
+        Length of the whole course in the finished tree, after ZScale, m; a clone's is counted
+        from the base of its first twin.
     radius : float64 (n,)
         Radius at the base of that course, m, before taper and flare.
     first, nodes : int32 (n,)
         Its first cross section, and their number.
     offset : float64 (n,)
-        Where it leaves its parent, m along the parent's course.
+        Where it leaves its parent, m along the parent's course in the finished tree.
     """
 
     level: NDArray[np.int32]
@@ -62,7 +63,7 @@ class Nodes(NamedTuple):
     stem : int32 (n,)
         The stem.
     z : float64 (n,)
-        Place along the stem's course, 0 to 1.
+        Place along the stem's course, 0 to 1; as it was before ZScale stretched the tree.
     """
 
     position: NDArray[np.float64]

@@ -44,7 +44,9 @@ def check_fit(scenario: Scenario) -> None:
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.planned_calendar, regular)
     residual = scenario.residual_trees
-    check_residual(residual, scenario.plot, scenario.species, scenario.environment)
+    check_residual(
+        residual, scenario.planting, scenario.plot, scenario.species, scenario.environment
+    )
     check_felled_residual(scenario.acts, residual, scenario.planned_calendar)
     check_wind(scenario)
     check_mortality(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from pydantic import ValidationInfo, model_validator
 
@@ -12,10 +12,18 @@ from forest.errors import InputError, nearest
 from forest.scenario.acts import Act, Fell
 from forest.scenario.complete import check_inside
 from forest.scenario.files import locate
-from forest.scenario.model import Environment, Plot
+from forest.scenario.inventory import Inventory
+from forest.scenario.model import Environment, Explicit, Planting, Plot
 from forest.scenario.placing import SAME_SPOT_M, Spots
 from forest.species.parametric import Parameters, load_parameters
 from forest.species.schema import Refusal, Table, quantity
+
+#: A trunk is no thicker than this share of its height. An old oak of the open field, 20 m high and
+#: 2 m thick, has a tenth; what has more than a quarter is a hollow pollard, or a slip of units.
+MOST_DBH_SHARE = 0.25
+#: Leaf area per ground below a crown is no more than this; the densest crowns of firs and spruces
+#: bear some 10 to 15.
+MOST_CROWN_LAI = 20.0
 
 
 class ResidualTree(Table):
@@ -37,9 +45,20 @@ class ResidualTree(Table):
     dbh_cm: float | None = quantity(
         None, "stem diameter at 1.3 m; default: as its form has it", unit="cm", gt=0, le=2000
     )
-    seed: int = quantity(1, "each seed is another tree of the species", unit="", ge=0, le=2**63 - 1)
+    seed: int = quantity(
+        1,
+        "each seed is another tree of the species; left out in a scenario, it is the tree's number "
+        "in the list",
+        unit="",
+        ge=0,
+        le=2**63 - 1,
+    )
     crown_lai: float = quantity(
-        4.0, "area of its leaves per ground below its crown", unit="m2/m2", ge=0, le=30
+        4.0,
+        "area of its leaves per ground below its crown",
+        unit="m2/m2",
+        ge=0,
+        le=MOST_CROWN_LAI,
     )
     leaf_area_m2: float | None = quantity(
         None, "area of its leaves, in place of crown_lai", unit="m2", ge=0, le=1e5
@@ -53,6 +72,17 @@ class ResidualTree(Table):
     parameters: Parameters | None = quantity(
         None, "the parameters of its form; filled in when the scenario is read", unit=""
     )
+
+    @model_validator(mode="after")
+    def _is_a_trunk(self) -> Self:
+        most = 100.0 * MOST_DBH_SHARE * self.height_m
+        if self.dbh_cm is not None and self.dbh_cm > most:
+            raise Refusal(
+                f"{self.dbh_cm:g} cm is no trunk of a tree of {self.height_m:g} m",
+                key="dbh_cm",
+                expected=f"at most {MOST_DBH_SHARE:g} of the height, {most:g} cm",
+            )
+        return self
 
     @model_validator(mode="after")
     def _read_species(self, info: ValidationInfo) -> Self:
@@ -70,8 +100,22 @@ class ResidualTree(Table):
         return self
 
 
+def number_seeds(trees: Any) -> Any:
+    """Give each tree without a seed its number in the list, from 1."""
+    if not isinstance(trees, list | tuple):
+        return trees
+    return tuple(
+        {"seed": k, **tree} if isinstance(tree, Mapping) else tree
+        for k, tree in enumerate(trees, start=1)
+    )
+
+
 def check_residual(
-    trees: Sequence[ResidualTree], plot: Plot, species: Iterable[str], environment: Environment
+    trees: Sequence[ResidualTree],
+    planting: Planting,
+    plot: Plot,
+    species: Iterable[str],
+    environment: Environment,
 ) -> None:
     """Refuse residual trees that do not fit the scenario."""
     if trees and environment.rendered is not None:
@@ -105,6 +149,15 @@ def check_residual(
                 f"unknown species {tree.like[:60]!r}, {nearest(tree.like, species)}",
                 key=f"{key}.like",
             )
+    if trees and isinstance(planting, Explicit | Inventory):
+        for i, (x, y) in enumerate([(one.x_m, one.y_m) for one in planting.trees]):
+            other = spots.neighbour(x, y)
+            if other is not None:
+                raise Refusal(
+                    f"stands on the spot of residual_trees[{other}]",
+                    key=f"planting.trees[{i}]",
+                    expected="0.01 m or more apart",
+                )
 
 
 def check_felled_residual(acts: Sequence[Act], trees: Sequence[ResidualTree], years: range) -> None:

@@ -36,7 +36,7 @@ from forest.scenario.model import (
 from forest.scenario.mortality import Mortality
 from forest.scenario.overrides import Changes
 from forest.scenario.regeneration import Regeneration
-from forest.scenario.residual import ResidualTree
+from forest.scenario.residual import ResidualTree, number_seeds
 from forest.scenario.wind import Wind
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, as_plain, quantity, refusal
@@ -200,6 +200,11 @@ class Scenario(Table):
         if not isinstance(species, dict):
             return species
         return {name: complete(name, given) for name, given in species.items()}
+
+    @field_validator("residual_trees", mode="before")
+    @classmethod
+    def _number_seeds(cls, trees: Any) -> Any:
+        return number_seeds(trees)
 
     @field_validator("climate")
     @classmethod

@@ -14,7 +14,7 @@ from forest.errors import InputError, nearest
 from forest.species.schema import Refusal, Table, quantity, refusal
 from forest.species.text import parse_toml, read_text
 
-_FOLDER = Path(__file__).parents[1] / "parametric" / "species"
+_FOLDER = Path(__file__).parent / "forms"
 _ANGLE: dict[str, Any] = {"unit": "degree", "ge": -720.0, "le": 720.0}
 _COLOUR = r"^#[0-9a-fA-F]{6}$"
 _SPREAD: dict[str, Any] = {"unit": "degree", "ge": 0.0, "le": 720.0}
@@ -123,6 +123,12 @@ class Parameters(Table):
         first = self.level[0]
         if first.length <= first.length_variation:
             raise Refusal("the trunk may have no length", key="level[0].length")
+        if self.base_splits and first.segments == 1:
+            raise Refusal(
+                "the trunk is one segment, and splits where its first two meet",
+                key="base_splits",
+                expected="0, or level[0].segments of 2 or more",
+            )
         return self
 
     def of_level(self, number: int) -> Level:

@@ -175,9 +175,16 @@ def _read_esri(path: Path) -> HeightField:
     except ValueError as error:
         raise input_error(f"not an ESRI grid: {error}", where=path.name) from None
     for word in ("ncols", "nrows", "cellsize"):
-        if not header.get(word, 0.0) > 0.0:
+        if word not in header:
             raise input_error(
                 f"no {word} in the header", where=path.name, expected=f"{word} above 0"
+            )
+        size = header[word]
+        whole = word == "cellsize" or size.is_integer()
+        if not (np.isfinite(size) and size > 0.0 and whole):
+            kind = "a number" if word == "cellsize" else "a whole number"
+            raise input_error(
+                f"{word} {size:g} is not allowed", where=path.name, expected=f"{kind} above 0"
             )
     rows, columns = int(header["nrows"]), int(header["ncols"])
     if len(values) != rows * columns:
@@ -189,6 +196,8 @@ def _read_esri(path: Path) -> HeightField:
         header.get(f"{axis}llcorner", header.get(f"{axis}llcenter", 0.5 * cell) - 0.5 * cell)
         for axis in "xy"
     )
+    if not np.isfinite(origin).all():
+        raise input_error(f"the corner lies at {origin}", where=path.name, expected="metres")
     heights = values.reshape(rows, columns)
     missing = (heights == header.get("nodata_value", -9999.0)) | ~np.isfinite(heights)
     if missing.all():
@@ -198,4 +207,7 @@ def _read_esri(path: Path) -> HeightField:
 
         nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
         heights = heights[tuple(nearest)]
-    return HeightField(heights, cell, (origin[0], origin[1]))
+    try:
+        return HeightField(heights, cell, (origin[0], origin[1]))
+    except InputError as error:
+        raise input_error(str(error), where=path.name) from None

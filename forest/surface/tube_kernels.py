@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from forest._jit import njit
 
 SHORTEST = 1e-9  # m; nodes no farther apart are one
-_LONGEST_RUN = 200  # nodes that one piece may pass over
-_WIDEST_MITRE = 2.0
-_TURNED_BACK = 1e-9  # of 1 + cosine between two pieces that lie on each other
+LONGEST_RUN = 200  # nodes that one piece may pass over
+WIDEST_MITRE = 2.0
+NO_DIRECTION = 1e-12
+TURNED_BACK = 1e-9  # of 1 + cosine between two pieces that lie on each other
 
 
 class Nodes(NamedTuple):
@@ -107,7 +108,7 @@ def thin(first: Any, place: Any, radius: Any, tolerance: Any, keep: Any) -> None
         keep[a] = True
         while a < last:
             b = a + 1
-            while b < last and b - a < _LONGEST_RUN and _near(place, radius, a, b + 1, tolerance):
+            while b < last and b - a < LONGEST_RUN and _near(place, radius, a, b + 1, tolerance):
                 b += 1
             keep[b] = True
             a = b
@@ -133,7 +134,7 @@ def _near(place: Any, radius: Any, a: Any, b: Any, tolerance: Any) -> Any:
 def _turn(before: Any, after: Any) -> Any:
     """Give a vector towards the inner side of a bend, as long as the tangent of half its angle."""
     cosine = np.sum(before * after)
-    return (after - before) / max(1.0 + cosine, _TURNED_BACK)
+    return (after - before) / max(1.0 + cosine, TURNED_BACK)
 
 
 @njit
@@ -143,77 +144,87 @@ def _heading(a: Any, b: Any) -> Any:
 
 @njit
 def unfold(first: Any, place: Any, radius: Any, keep: Any) -> None:
-    """Leave out nodes whose cross section would cut its neighbour's: sharp bends of thick wood."""
+    """Leave out nodes whose cross section would cut its neighbour's: sharp bends of thick wood.
+
+    One whose neighbours lie on each other stays, so that every piece has a length.
+    """
     for c in range(len(first) - 1):
-        last = first[c + 1] - 1
-        folded = True
-        while folded:
-            folded = False
-            w, a = -1, first[c]
-            while a < last:
-                b = a + 1
-                while not keep[b]:
-                    b += 1
-                here = _heading(place[a], place[b])
-                low, high = np.zeros(3), np.zeros(3)
-                if w >= 0:
-                    low = radius[a] * _turn(_heading(place[w], place[a]), here)
-                if b < last:
-                    d = b + 1
-                    while not keep[d]:
-                        d += 1
-                    high = radius[b] * _turn(here, _heading(place[b], place[d]))
-                both = low + high
-                both -= np.sum(both * here) * here
-                if np.sqrt(np.sum(both**2)) < _distance(place[a], place[b]):
-                    w, a = a, b
-                    continue
-                folded = True
-                if np.sum(low**2) > np.sum(high**2):
-                    keep[a] = False
-                    a = w  # and look again at what is below
-                    w = a - 1
-                    while w >= first[c] and not keep[w]:
-                        w -= 1
-                    if w < first[c]:
-                        w = -1
-                else:
-                    keep[b] = False
+        begin, last = first[c], first[c + 1] - 1
+        a = begin
+        while a < last:
+            b = _next(keep, a, 1)
+            here = _heading(place[a], place[b])
+            low, high = np.zeros(3), np.zeros(3)
+            w, d = a, b
+            if a > begin:
+                w = _next(keep, a, -1)
+                low = radius[a] * _turn(_heading(place[w], place[a]), here)
+            if b < last:
+                d = _next(keep, b, 1)
+                high = radius[b] * _turn(here, _heading(place[b], place[d]))
+            both = low + high
+            both -= np.sum(both * here) * here
+            folds = np.sqrt(np.sum(both**2)) >= _distance(place[a], place[b])
+            lower = b == last or (a > begin and np.sum(low**2) > np.sum(high**2))
+            apart = _distance(place[w], place[b]) if lower else _distance(place[a], place[d])
+            if not folds or apart <= SHORTEST or (a == begin and b == last):
+                a = b
+            elif lower:
+                keep[a] = False
+                a = w
+            else:
+                keep[b] = False
+                a = w  # what is below may now fold
+
+
+@njit
+def _next(keep: Any, k: Any, way: Any) -> Any:
+    """Give the next node that stands."""
+    k += way
+    while not keep[k]:
+        k += way
+    return k
 
 
 @njit
 def sections(nodes: Any, skeleton_side: Any, side: Any, across: Any) -> None:
     """Span each cross section by two vectors, square to the axis or halving its bend.
 
-    In the plane of the bend they are longer, as a mitre is, so that the tube keeps its girth.
+    Both slide along the pieces of the axis, so that each piece is a prism or a cone: in the plane
+    of a bend they are longer there, as a mitre is.
     """
     for c in range(len(nodes.first) - 1):
         begin, last = nodes.first[c], nodes.first[c + 1] - 1
-        for k in range(begin, last + 1):
-            lower, upper = max(k - 1, begin), min(k + 1, last)
-            before = _heading(nodes.place[lower], nodes.place[k]) if k > begin else np.zeros(3)
-            after = _heading(nodes.place[k], nodes.place[upper]) if k < last else before
-            if k == begin:
-                before = after
-            middle = before + after
-            length = np.sqrt(np.sum(middle**2))
-            middle = middle / length if length > _TURNED_BACK else after
-            s = skeleton_side[nodes.internode[k]]
-            s = s - np.sum(s * middle) * middle
-            if np.sum(s**2) < 1e-6:
-                least = np.argmin(np.abs(middle))
-                s = -middle[least] * middle
-                s[least] += 1.0
-            s = s / np.sqrt(np.sum(s**2))
-            t = np.cross(middle, s)
+        before = _heading(nodes.place[begin], nodes.place[begin + 1])
+        s = _square(skeleton_side[nodes.internode[begin]], before)
+        side[begin], across[begin] = s, np.cross(before, s)
+        for k in range(begin + 1, last):
+            after = _heading(nodes.place[k], nodes.place[k + 1])
+            t = np.cross(before, s)
             bend = after - before
             sharp = np.sqrt(np.sum(bend**2))
-            if sharp > _TURNED_BACK:
-                bend = bend / sharp
-                longer = min(2.0 / max(length, _TURNED_BACK), _WIDEST_MITRE) - 1.0
-                s = s + longer * np.sum(s * bend) * bend
-                t = t + longer * np.sum(t * bend) * bend
+            cosine = np.sum(before * after)
             side[k], across[k] = s, t
+            if sharp > TURNED_BACK and cosine > TURNED_BACK - 1.0:
+                inner = _square(bend, before)
+                longer = min(np.sqrt(2.0 / (1.0 + cosine)), WIDEST_MITRE) * bend / sharp - inner
+                side[k] += np.sum(s * inner) * longer
+                across[k] += np.sum(t * inner) * longer
+                s = s + np.sum(s * inner) * (_square(bend, after) - inner)
+                s = _square(s, after)  # what rounding has left
+            before = after
+        side[last], across[last] = s, np.cross(before, s)
+
+
+@njit
+def _square(vector: Any, heading: Any) -> Any:
+    """Give a unit vector at right angles to the heading, as near to the vector as can be."""
+    found = vector - np.sum(vector * heading) * heading
+    if np.sum(found**2) < NO_DIRECTION**2:
+        least = np.argmin(np.abs(heading))
+        found = -heading[least] * heading
+        found[least] += 1.0
+    return found / np.sqrt(np.sum(found**2))
 
 
 @njit

@@ -43,8 +43,16 @@ def _level(number: int) -> st.SearchStrategy[dict[str, object]]:
     )
 
 
+def _whole(**values: object) -> Parameters:
+    """Give the trunk of clones a joint at which they can leave."""
+    first, *others = values["level"]  # type: ignore[misc]
+    if values["base_splits"]:
+        first = {**first, "segments": max(first["segments"], 2)}
+    return Parameters(**{**values, "level": (first, *others)})
+
+
 parameters = st.builds(
-    Parameters,
+    _whole,
     shape=st.integers(0, 8),
     base_size=st.floats(0.0, 0.6),
     scale=st.floats(1.0, 30.0),
@@ -52,7 +60,9 @@ parameters = st.builds(
     ratio=st.floats(0.005, 0.1),
     flare=st.sampled_from([0.0, 0.7]),
     trunk_scale=st.sampled_from([1.0, 1.2]),
-    base_splits=st.integers(0, 2),
+    base_splits=st.integers(0, 3),
+    z_scale=st.sampled_from([1.0, 0.4, 2.0, 7.0]),
+    z_scale_variation=st.sampled_from([0.0, 0.3]),
     clone_habit=st.sampled_from([0.5, 1.0]),
     leaves=st.integers(-4, 4),
     attraction_up=st.floats(-3, 3),
@@ -185,12 +195,17 @@ def test_shipped_species_grow(name: str) -> None:
         ("1Brunches=3", "did you mean '1Branches'?"),
         ("level.1.brunches=3", "did you mean 'level.1.branches'?"),
         ("0Length=0", "no length"),
+        (
+            "0CurveRes=1",
+            "base_splits: the trunk is one segment, and splits where its first two meet; expected",
+        ),
         ("Scale", "changes nothing"),
     ],
 )
 def test_refused_parameters(change: str, words: str) -> None:
+    species = "weeping_willow" if "base_splits" in words else "quaking_aspen"
     with pytest.raises(InputError) as error:
-        load_parameters("quaking_aspen").with_changes([change])
+        load_parameters(species).with_changes([change])
     assert words in str(error.value)
 
 

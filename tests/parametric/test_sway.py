@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from forest.errors import InputError
-from forest.parametric import grow
+from forest.parametric import from_paper, grow, load_parameters
 
 
-@pytest.mark.parametrize("name", ["quaking_aspen", "sassafras", "queen_palm"])
-def test_only_turns_change(name: str) -> None:
-    still = grow(name, 3)
+@pytest.mark.parametrize(
+    ("name", "z_scale"),
+    [("quaking_aspen", 1.0), ("sassafras", 1.0), ("queen_palm", 1.0), ("black_tupelo", 2.0)],
+)
+def test_only_turns_change(name: str, z_scale: float) -> None:
+    still = grow(load_parameters(name).with_changes([f"ZScale={z_scale}"]), 3)
     moved = still.swayed(7.0, 5.0, 3.0, time_scale=2000.0)
     assert np.abs(moved.nodes.position - still.nodes.position).max() > 0.1
     a, b = still.skeleton(), moved.skeleton()
@@ -40,11 +43,16 @@ def test_no_wind_and_a_breath() -> None:
     np.testing.assert_allclose(breath.nodes.position, still.nodes.position, atol=1e-6)
 
 
-def test_moments_do_not_depend_on_each_other() -> None:
-    still = grow("lilac", 3)
-    first = still.swayed(2.0, 4.0).nodes.position
-    still.swayed(9.0, 4.0)
-    np.testing.assert_array_equal(still.swayed(2.0, 4.0).nodes.position, first)
+def test_a_stretched_tree_sways_as_one_of_its_length() -> None:
+    """A straight trunk of 10 m that is stretched to 20 m is one of 20 m, in calm and in wind."""
+    values = {"Levels": 1, "0CurveRes": 6, "0CurveV": 0}
+    stretched = grow(from_paper({**values, "Scale": 10, "ZScale": 2, "Ratio": 0.02}), 3)
+    tall = grow(from_paper({**values, "Scale": 20, "Ratio": 0.01}), 3)
+    for column in ("length", "radius", "offset"):
+        np.testing.assert_allclose(getattr(stretched.stems, column), getattr(tall.stems, column))
+    one, other = (t.swayed(3.0, 4.0, 2.0, time_scale=2000.0) for t in (stretched, tall))
+    assert np.abs(other.nodes.position - tall.nodes.position).max() > 0.1
+    np.testing.assert_allclose(one.nodes.position, other.nodes.position, atol=1e-9)
 
 
 def test_refused_winds() -> None:

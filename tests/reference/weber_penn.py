@@ -73,6 +73,7 @@ class Stem:
     key: Any
     first: int
     offset: float
+    bearer: Stem | None
     place: list[Any] = field(default_factory=list)
     frame: list[Matrix] = field(default_factory=list)
     z: list[float] = field(default_factory=list)
@@ -92,6 +93,7 @@ class Spot:
     limit: float
     offset: float
     key: Any
+    bearer: Stem | None
 
 
 class Tree:
@@ -134,7 +136,7 @@ class Tree:
         radius = spot.parent_radius * (length / spot.parent_length) ** p.ratio_power
         radius = min(radius, spot.limit)
         reach = spot.offset / spot.parent_length
-        stem = Stem(n, False, length, radius, share, reach, spot.key, 0, spot.offset)
+        stem = Stem(n, False, length, radius, share, reach, spot.key, 0, spot.offset, spot.bearer)
         level = p.of_level(n)
         axis = spot.frame[:, 2].copy()
         frame = spot.frame
@@ -175,7 +177,7 @@ class Tree:
         for key, s, frame, ax, at, u, la, h in clones:
             twin = Stem(
                 stem.level, True, stem.length, stem.radius, stem.share, stem.reach, key, s,
-                stem.length * s / res,
+                stem.length * s / res, stem,
             )  # fmt: skip
             found += self.course(twin, at, frame, ax, u, la, h)
         return found
@@ -312,7 +314,7 @@ class Tree:
         limit = stem.width[below] + part * (stem.width[below + 1] - stem.width[below])
         spot = Spot(
             place, f, length, most * stem.length, stem.length, stem.radius, limit,
-            z * stem.length, key,
+            z * stem.length, key, stem,
         )  # fmt: skip
         self.grow(stem.level + 1, spot)
         return turned
@@ -323,6 +325,39 @@ def reference_tree(p: Parameters, seed: int, scale: float) -> Tree:
     length = p.level[0].length * scale
     trunk = Spot(
         np.zeros(3), np.eye(3), length, length, length, length * p.ratio, math.inf, 0.0,
-        np.uint64(1),
+        np.uint64(1), None,
     )  # fmt: skip
-    return Tree(p, seed, scale, trunk, p.trunk_scale)
+    tree = Tree(p, seed, scale, trunk, p.trunk_scale)
+    chance = 2 * draw(np.uint64(seed), np.uint64(0), OF_SELF)[2] - 1
+    stretch(tree, p.z_scale + chance * p.z_scale_variation)
+    return tree
+
+
+def stretch(tree: Tree, factor: float) -> None:
+    """Stretch a tree along z; frames stay at right angles, with their axes along the stems."""
+    d = np.diag([1.0, 1.0, factor])
+    stems = [stem for level in tree.stems for stem in level]
+    for stem in stems:
+        stem.place = [d @ x for x in stem.place]
+        for k, f in enumerate(stem.frame):
+            heading = d @ f[:, 2]
+            heading = heading / np.linalg.norm(heading)
+            side = f[:, 0] - heading * float(f[:, 0] @ heading)
+            side = side / np.linalg.norm(side)
+            stem.frame[k] = np.column_stack((side, np.cross(heading, side), heading))
+    tree.leaves = [(d @ x, f) for x, f in tree.leaves]
+    sizes = []
+    for stem in stems:
+        at = stem.offset / stem.bearer.length if stem.bearer else 0.0
+        sizes.append((metres(stem, 1.0), metres(stem.bearer, at) if stem.bearer else 0.0))
+    for stem, size in zip(stems, sizes, strict=True):
+        stem.length, stem.offset = size
+
+
+def metres(stem: Stem, share: float) -> float:
+    """Go along a stem's course from its base to what was a share of it before it was stretched."""
+    total = metres(stem.bearer, min(share, stem.z[0])) if stem.clone and stem.bearer else 0.0
+    for low, high, a, b in zip(stem.z, stem.z[1:], stem.place, stem.place[1:], strict=False):
+        part = max(0.0, min(1.0, (share - low) / (high - low)))
+        total += part * float(np.linalg.norm(b - a))
+    return total

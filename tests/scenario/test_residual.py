@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from forest.errors import InputError
+from forest.scenario import Scenario
 from tests.test_bad_input import refused
 from tests.tiny import TOML, tiny
 
@@ -44,7 +45,7 @@ BAD = [
     ("height_m = 8", "height_m = 800", "expected number, 0.5 to 150"),
     ("height_m = 8", "", "residual_trees[0].height_m: missing key 'height_m'"),
     ("height_m = 8", "height_m = 8\ndbh_cm = -1", "residual_trees[0].dbh_cm: -1"),
-    ("height_m = 8", "height_m = 1\ndbh_cm = 9", "residual_trees[0].dbh_cm: its stem does not"),
+    ("height_m = 8", "height_m = 8\ndbh_cm = 201", "dbh_cm: 201 cm is no trunk of a tree of 8 m"),
     ("height_m = 8", "height_m = nan", "residual_trees[0].height_m: nan"),
     ("height_m = 8", "height_m = 8\ncrown_lai = 99", "residual_trees[0].crown_lai: 99"),
     ("height_m = 8", "height_m = 8\nseed = -1", "residual_trees[0].seed: -1"),
@@ -73,6 +74,32 @@ def test_refused(tmp_path: Path, old: str, new: str, says: str) -> None:
     path = tmp_path / "wrong.toml"
     path.write_text(TOML + TREES.replace(old, new, 1))
     refused(tmp_path, "run", path, "--out", tmp_path / "run.h5", says=says)
+
+
+@pytest.mark.parametrize("x_m", [5.0, 5.009])
+def test_no_tree_is_planted_on_a_residual_stem(x_m: float) -> None:
+    old = 'residual_trees=[{name="a", x_m=5, y_m=5, species="quaking_aspen", height_m=5}]'
+    kinds = {
+        "explicit": f"{{x_m=1, y_m=1}}, {{x_m={x_m}, y_m=5}}",
+        "inventory": f"{{x_m=1, y_m=1, height_m=1}}, {{x_m={x_m}, y_m=5, height_m=1}}",
+    }
+    for kind, trees in kinds.items():
+        one = ["species={fagus_sylvatica={}}", "output.sample_trees.ids=[]"]
+        one.append(f'planting={{kind="{kind}", trees=[{trees}]}}')
+        says = r"planting.trees\[1\]: stands on the spot of residual_trees\[0\]"
+        with pytest.raises(InputError, match=says):
+            tiny(old, *one)
+        tiny(old.replace("y_m=5", "y_m=4.98"), *one)
+
+
+def test_each_tree_has_a_seed_of_its_own() -> None:
+    """Its number in the list, unless it is given; a stored scenario says which."""
+    tree = '{{name="{}", x_m={}, y_m=5, species="quaking_aspen", height_m=5{}}}'
+    given = ["", "", ", seed=1"]
+    trees = ", ".join(tree.format(f"t{k}", k, more) for k, more in enumerate(given))
+    scenario = tiny(f"residual_trees=[{trees}]")
+    assert [one.seed for one in scenario.residual_trees] == [1, 2, 1]
+    assert Scenario.from_toml(scenario.to_toml()) == scenario
 
 
 def test_rendered_light_is_refused() -> None:

@@ -68,3 +68,24 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
                  "rgb.png", "other.xyz", "missing.npy"):  # fmt: skip
         with pytest.raises(InputError, match=name.replace(".", r"\.")):
             read_heights(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("nrows 1", "nrows inf", "nrows inf is not allowed; expected a whole number above 0"),
+        ("nrows 1", "nrows nan", "nrows nan is not allowed"),
+        ("ncols 2", "ncols 2.5", "ncols 2.5 is not allowed; expected a whole number above 0"),
+        ("ncols 2", "ncols -2", "ncols -2 is not allowed"),
+        ("cellsize 1", "cellsize inf", "cellsize inf is not allowed; expected a number above 0"),
+        ("cellsize 1", "", "no cellsize in the header"),
+        ("cellsize 1", "cellsize 1\nxllcorner inf", "the corner lies at"),
+    ],
+)
+def test_bad_headers_are_refused(tmp_path: Path, old: str, new: str, says: str) -> None:
+    right = "ncols 2\nnrows 1\ncellsize 1\n"
+    assert old in right
+    (tmp_path / "h.asc").write_text(right.replace(old, new) + "1 2\n")
+    with pytest.raises(InputError) as error:
+        read_heights(tmp_path / "h.asc")
+    assert str(error.value).startswith(f"h.asc: {says}")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.errors import InputError
 from forest.surface.export.parts import Image, Material, Part, encoded, mime_type
 from forest.surface.mesh import Mesh, Split
 
@@ -16,6 +17,7 @@ _FLOAT, _UNSIGNED_INT = 5126, 5125
 _ARRAY_BUFFER, _ELEMENT_ARRAY_BUFFER = 34962, 34963
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _REPEAT = 9729, 9987, 10497
 _TRIANGLES = 4
+_MOST_BYTES = 2**32 - 2**20  # a .glb counts them in 32 bits; the rest is for its head
 _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 #: From z up to y up, a turn about the x axis.
@@ -34,11 +36,17 @@ def write_glb(parts: Sequence[Part], draft: Path) -> None:
     draft : path
         The file.
 
+    Raises
+    ------
+    InputError
+        If it would be larger than the 4 GB that a .glb file can hold.
+
     Notes
     -----
     Points lie around a node's translation, so that single precision is enough anywhere on a plot.
     `Mesh.data` become attributes of the points, ``_RADIUS_M`` and so on, as floats: glTF knows no
-    integers of 32 bits there. Points are doubled at seams of the texture coordinates.
+    integers of 32 bits there; those that are 0 everywhere are left out. Points are doubled at
+    seams of the texture coordinates.
     """
     file = _File()
     for part in parts:
@@ -83,6 +91,9 @@ class _File:
 
     def save(self, draft: Path) -> None:
         """Write the file."""
+        if len(self._bytes) > _MOST_BYTES:
+            what = f"would hold {len(self._bytes) / 1e9:.1f} GB"
+            raise InputError(what, where=draft.name, expected="at most 4; try it without leaves")
         self._gltf.buffers = [self._lib.Buffer(byteLength=len(self._bytes))]
         self._gltf.set_binary_blob(bytes(self._bytes))
         self._gltf.save_binary(str(draft))
@@ -104,7 +115,8 @@ class _File:
                 along = tangents(mesh, split, normals) @ Y_UP.T
                 attributes["TANGENT"] = np.column_stack((along, np.ones(len(along))))
             for name, values in mesh.data.items():
-                attributes[f"_{name.upper()}"] = values[split.source].astype(np.float64)
+                if np.any(values):
+                    attributes[f"_{name.upper()}"] = values[split.source].astype(np.float64)
             primitive = self._lib.Primitive(
                 attributes=self._lib.Attributes(
                     **{name: self._points(name, values) for name, values in attributes.items()}

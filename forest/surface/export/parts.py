@@ -5,17 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.surface.mesh import POINT_DATA, Mesh
-from forest.trees.leaves import LEAF_SHAPES, OUTLINES, Leaves
+from forest.trees.leaves import LEAF_SHAPES, OUTLINES, SPRAY, Leaves, outline_area
 
 Image = NDArray[np.uint8] | Path
 
 _LEAF_PIXELS = 256
+_NEEDLES, _NEEDLE_RISE = 22, 0.16  # pairs; how far a needle's tip is above its foot
 _FINER = 4  # pixels of the outline before it is averaged, along each side
 
 
@@ -145,27 +147,64 @@ def leaf_parts(
 def leaf_image(shape: int) -> NDArray[np.uint8]:
     """Draw a leaf's outline, (h, w, 4): white, lighter along the midrib, opaque within.
 
+    A spray is a comb of needles, which cover as much of the picture as the outline would.
+
     Parameters
     ----------
     shape : int
         Its outline, an index into `LEAF_SHAPES`; the petiole is at the middle of the lower edge.
     """
-    from PIL import Image as Picture
-    from PIL import ImageDraw
-
-    size = _LEAF_PIXELS * _FINER
-    # A pixel of room all around, so that mipmaps and repeats do not bleed over the edges.
-    inner = 1.0 - 2.0 / _LEAF_PIXELS
-    along, across = OUTLINES[shape].T
-    x = (0.5 + inner * across) * size
-    y = (1.0 - (0.5 + inner * (along - 0.5))) * size
-    mask = Picture.new("L", (size, size))
-    ImageDraw.Draw(mask).polygon(list(zip(x.tolist(), y.tolist(), strict=True)), fill=255)
-    alpha = np.asarray(mask.resize((_LEAF_PIXELS, _LEAF_PIXELS), Picture.Resampling.BOX))
+    alpha = _comb() if shape == SPRAY else _outlined(shape)
     off = np.abs(np.linspace(-1.0, 1.0, _LEAF_PIXELS))[None, :]
     shade = np.broadcast_to(225.0 - 25.0 * off + 30.0 * np.exp(-((off / 0.03) ** 2)), alpha.shape)
     grey = shade.round().astype(np.uint8)
     return np.stack((grey, grey, grey, alpha), axis=2)
+
+
+def _outlined(shape: int) -> NDArray[np.uint8]:
+    along, across = OUTLINES[shape].T
+    mask, draw = _sheet()
+    draw.polygon(_pixels(along, across), fill=255)
+    return _averaged(mask)
+
+
+def _comb() -> NDArray[np.uint8]:
+    """Draw needles on both sides of a shoot, as thick as it takes to cover the outline's area."""
+    foot = np.linspace(0.0, 1.0 - _NEEDLE_RISE, _NEEDLES)
+    reach = 0.5 * np.minimum(1.0, 0.3 + 3.0 * (1.0 - _NEEDLE_RISE - foot))
+    alpha = np.zeros((1, 1), np.uint8)
+    thick = _FINER
+    while alpha.mean() < 255.0 * outline_area(OUTLINES[SPRAY]):
+        thick += 1
+        mask, draw = _sheet()
+        for a, b in zip(foot, reach, strict=True):
+            ways = np.array([a + _NEEDLE_RISE, a, a + _NEEDLE_RISE]), np.array([-b, 0.0, b])
+            draw.line(_pixels(*ways), fill=255, width=thick)
+        draw.line(_pixels(np.array([0.0, 0.95]), np.zeros(2)), fill=255, width=2 * thick)
+        alpha = _averaged(mask)
+    return alpha
+
+
+def _sheet() -> tuple[Any, Any]:
+    from PIL import Image as Picture
+    from PIL import ImageDraw
+
+    mask = Picture.new("L", (_LEAF_PIXELS * _FINER,) * 2)
+    return mask, ImageDraw.Draw(mask)
+
+
+def _pixels(along: NDArray[np.float64], across: NDArray[np.float64]) -> list[tuple[float, float]]:
+    """Give places on the blade, shares of its length and width, as those on the sheet."""
+    size = _LEAF_PIXELS * _FINER
+    # A pixel of room all around, so that mipmaps and repeats do not bleed over the edges.
+    inner = 1.0 - 2.0 / _LEAF_PIXELS
+    x = (0.5 + inner * across) * size
+    y = (0.5 - inner * (along - 0.5)) * size
+    return list(zip(x.tolist(), y.tolist(), strict=True))
+
+
+def _averaged(mask: Any) -> NDArray[np.uint8]:
+    return np.asarray(mask.reduce(_FINER))
 
 
 def encoded(image: Image) -> bytes:
