@@ -58,7 +58,7 @@ class Chain(NamedTuple):
     push: _Floats  # (n, 3) scratch
     straddles: NDArray[np.bool_]  # (n,) whether its loop is on several limbs
     live: _Ints  # (n,) numbers of those that are not gone
-    count: _Ints  # (3,) particles ever, live ones, relinkings
+    tally: _Ints  # (3,) particles ever, live ones, relinkings
 
 
 def empty_chain(room: int) -> Chain:
@@ -80,15 +80,15 @@ def empty_chain(room: int) -> Chain:
         push=np.zeros((room, 3)),
         straddles=np.zeros(room, np.bool_),
         live=ints[4],
-        count=np.zeros(3, np.int64),
+        tally=np.zeros(3, np.int64),
     )
 
 
 def with_room(chain: Chain, room: int) -> Chain:
     """Copy a chain into longer arrays."""
     longer = empty_chain(room)
-    for old, new in zip(chain, longer, strict=True):
-        new[: len(old)] = old
+    for name, old in chain._asdict().items():
+        getattr(longer, name)[: len(old)] = old
     return longer
 
 
@@ -156,7 +156,7 @@ def _push(chain: Any, forces: Any, i: Any) -> None:
 @njit
 def _move(surface: Any, chain: Any, forces: Any) -> None:
     """Take a semi-implicit step: first velocities, then places with the new ones."""
-    live = chain.count[1]
+    live = chain.tally[1]
     for j in range(live):
         if chain.state[chain.live[j]] == FLOWING:
             _push(chain, forces, chain.live[j])
@@ -175,10 +175,10 @@ def _move(surface: Any, chain: Any, forces: Any) -> None:
 @njit
 def _put_between(surface: Any, chain: Any, a: Any, b: Any) -> None:
     """Put a new particle into the middle of a link."""
-    m = chain.count[0]
-    chain.count[0] += 1
-    chain.live[chain.count[1]] = m
-    chain.count[1] += 1
+    m = chain.tally[0]
+    chain.tally[0] += 1
+    chain.live[chain.tally[1]] = m
+    chain.tally[1] += 1
     chain.state[m] = FLOWING
     chain.cone[m] = chain.cone[a]
     chain.mother[m] = a
@@ -213,7 +213,7 @@ def _take_out(chain: Any, stays: Any, goes: Any) -> None:
 @njit
 def _mend_links(surface: Any, chain: Any, forces: Any) -> None:
     """Split links that are too long and merge those too short, but for the smallest loops."""
-    for j in range(chain.count[1]):
+    for j in range(chain.tally[1]):
         a = chain.live[j]
         if chain.state[a] == GONE:
             continue
@@ -230,21 +230,21 @@ def _mend_links(surface: Any, chain: Any, forces: Any) -> None:
             if third != a and chain.ahead[b] != a:  # more than LEAST_LOOP
                 _take_out(chain, min(a, b), max(a, b))
     kept = 0
-    for j in range(chain.count[1]):
+    for j in range(chain.tally[1]):
         if chain.state[chain.live[j]] != GONE:
             chain.live[kept] = chain.live[j]
             kept += 1
-    chain.count[1] = kept
+    chain.tally[1] = kept
 
 
 @njit
 def _part(chain: Any) -> None:
     """Try to relink wherever two neighbours are on different limbs."""
-    for j in range(chain.count[1]):
+    for j in range(chain.tally[1]):
         a = chain.live[j]
         b = chain.ahead[a]
         if chain.limb[a] != chain.limb[b]:
-            chain.count[2] += relink(
+            chain.tally[2] += relink(
                 a,
                 b,
                 chain.limb,
@@ -260,7 +260,7 @@ def _part(chain: Any) -> None:
 @njit
 def _mark_straddling(chain: Any) -> None:
     """Mark the loops that are on several limbs: those are led by momentum alone."""
-    live = chain.live[: chain.count[1]]
+    live = chain.live[: chain.tally[1]]
     for i in live:
         chain.straddles[i] = False
     for i in live:
@@ -284,10 +284,10 @@ def advance(surface: Any, chain: Any, forces: Any, steps: Any) -> Any:
     """
     for taken in range(steps):
         flowing = 0
-        for j in range(chain.count[1]):
+        for j in range(chain.tally[1]):
             if chain.state[chain.live[j]] == FLOWING:
                 flowing += 1
-        if flowing == 0 or chain.count[0] + chain.count[1] > len(chain.live):
+        if flowing == 0 or chain.tally[0] + chain.tally[1] > len(chain.live):
             return taken, flowing
         _move(surface, chain, forces)
         _mend_links(surface, chain, forces)

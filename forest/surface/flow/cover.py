@@ -27,12 +27,14 @@ _WANTED_ENERGY = 0.8 * _AMPLITUDE
 _FEEDBACK = 15.0
 _SOFTENING = 10.0
 _STILL = 4.0
-_CROWDED = 0.2
+_TOUCHED = 0.2
+_WIDEST = 1.2
+_SPLITTING = 1.05  # a little above 1, lest even covers split for ever
 _DYING = 0.7
 _STEP = 0.03
 _NEIGHBOURS = 3.0  # radii within which particles feel each other
 #: Distance of neighbours in an even cover, times the radius of repulsion.
-SPACING = 1.6
+SPACING = 1.75
 _ROUNDS = 100
 #: A cover has settled when no particle moves by more than this share of the spacing.
 _SETTLED = 0.02
@@ -104,7 +106,7 @@ def _repel(place: _Floats, radius: _Floats) -> tuple[_Floats, _Floats, _Floats]:
     velocity *= radius[:, None] ** 2
     energy = np.bincount(i, of_i, n) + np.bincount(j, of_j, n)
     rise = np.bincount(i, of_i * square, n) + np.bincount(j, of_j * square, n)
-    return velocity, energy, rise / radius**3
+    return velocity, np.asarray(energy, np.float64), rise / radius**3
 
 
 def _round(surface: Surface, cover: Cover, seed: int, serial: int) -> tuple[Cover, float]:
@@ -122,8 +124,8 @@ def _round(surface: Surface, cover: Cover, seed: int, serial: int) -> tuple[Cove
     change = -_FEEDBACK * (energy - _WANTED_ENERGY) / (rise * wanted + _SOFTENING) * wanted
     radius = np.clip(radius + _STEP * change, 0.2 * wanted, 1.5 * wanted)
     still = speed < _STILL * radius
-    lonely = (energy < _CROWDED * _WANTED_ENERGY) | (radius > 1.2 * wanted)
-    split = still & lonely & (radius > wanted)
+    settled = (energy > _TOUCHED * _WANTED_ENERGY) | (radius > _WIDEST * wanted)
+    split = still & settled & (radius > _SPLITTING * wanted)
     chance = _uniform(seed, cover.number, serial)
     dies = still & (radius < _DYING * wanted) & (chance > radius / (_DYING * wanted))
     stays = ~dies

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
+from forest.surface.export import Material, Part
 from forest.surface.flow.cover import Near, cover
 from forest.surface.flow.flowing import FlowRules, flow
 from forest.surface.flow.presets import Colour, FeaturePreset, Ribbons, Spots, feature_preset
@@ -57,6 +58,20 @@ class FlowBark:
     quad_m: _Floats
     trails: Trails | None
 
+    def parts(self) -> list[Part]:
+        """Give pieces with materials, as `forest.surface.export.write_mesh` takes them."""
+        found = []
+        for name, mesh in self.pieces.items():
+            red, green, blue = (_linear(part) for part in self.colours[name])
+            material = Material(f"bark_{name}", (red, green, blue), double_sided=True)
+            found.append(Part(mesh, material, f"bark_{name}"))
+        return found
+
+
+def _linear(part: float) -> float:
+    """Turn a part of an sRGB colour into a linear one (IEC 61966-2-1)."""
+    return part / 12.92 if part <= 0.04045 else float(((part + 0.055) / 1.055) ** 2.4)
+
 
 def quad_sizes(bark: Bark, sites: Sites) -> _Floats:
     """Give half the side of each site's quad so that all quads together cover the surface, m.
@@ -93,8 +108,9 @@ def background(bark: Bark, sites: Sites, half: _Floats) -> Mesh:
         u[None, :, None] * sites.across[:, None] + v[None, :, None] * sites.along[:, None]
     )
     uv = sites.uv[:, None] + size * np.stack((u, v), axis=1)[None]
-    first = 4 * np.arange(len(sites))[:, None]
-    triangles = np.concatenate((first + [0, 1, 2], first + [0, 2, 3]), axis=1).reshape(-1, 3)
+    first = 4 * np.arange(len(sites), dtype=np.int32)[:, None, None]
+    halves = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    triangles = (first + halves).reshape(-1, 3)
     return mesh_of(bark, corner.reshape(-1, 3), triangles, uv.reshape(-1, 2))
 
 
@@ -119,7 +135,10 @@ def spots(
     raised = preset.at(rules.raise_m, age)
     low = edge + np.repeat(lift, _FAN)[:, None] * out
     high = edge + np.repeat(lift + raised, _FAN)[:, None] * out
-    top = sites.place[has] + (lift + raised + preset.at(rules.peak_m, age))[:, None] * sites.normal[has]
+    top = (
+        sites.place[has]
+        + (lift + raised + preset.at(rules.peak_m, age))[:, None] * sites.normal[has]
+    )
     points = np.concatenate((top, high, low))
     around = np.stack((u, v), axis=2) + sites.uv[has][:, None]
     uv = np.concatenate((sites.uv[has], around.reshape(-1, 2), around.reshape(-1, 2)))
@@ -160,7 +179,9 @@ def _layer(
     has = np.flatnonzero(luck[:, 0] < preset.at(rules.density, sites.age))
     age, luck, n = sites.age[has], luck[has], len(has)
     length = preset.at(rules.length_m, age) * (0.6 + 0.8 * luck[:, 1])
-    twist = np.radians(preset.at(rules.twist_deg, age)) * twists(seed, 20 + layer, sites.number[has])
+    twist = np.radians(preset.at(rules.twist_deg, age)) * twists(
+        seed, 20 + layer, sites.number[has]
+    )
     middle = _ways(bark, sites.place[has], length / rules.segments, twist, rules.segments)
     nodes = rules.segments + 1
     out = unit_normals(bark.blend, middle.reshape(-1, 3)).reshape(n, nodes, 3)
@@ -168,13 +189,15 @@ def _layer(
     across = np.cross(step, out)
     across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-12)
     reach = np.linspace(-1.0, 1.0, nodes)
-    taper = np.maximum(1.0 - np.abs(reach) ** 3, 0.05)
+    taper = np.maximum(1.0 - np.abs(reach) ** 5, 0.1)
     wobble = 1.0 + 0.25 * np.sin(7.0 * reach[None] + 6.28 * luck[:, 2:3])
     wide = 0.5 * preset.at(rules.width_m, age)[:, None] * taper * wobble * (0.7 + 0.6 * luck[:, 3:])
     high = preset.at(rules.height_m, age)[:, None] * rules.layers[layer] * np.sqrt(taper)
     lift = _above_quads(sites, half)[has][:, None]
     columns, texture = [], []
-    along = np.cumsum(np.linalg.norm(np.diff(middle, axis=1, prepend=middle[:, :1]), axis=2), axis=1)
+    along = np.cumsum(
+        np.linalg.norm(np.diff(middle, axis=1, prepend=middle[:, :1]), axis=2), axis=1
+    )
     for side, height in ((-1.0, 0.0), (_BEVEL - 1.0, 1.0), (1.0 - _BEVEL, 1.0), (1.0, 0.0)):
         spread = side * wide
         foot = bark.blend.project((middle + spread[..., None] * across).reshape(-1, 3))

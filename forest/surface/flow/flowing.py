@@ -166,16 +166,16 @@ def _start(surface: Limbed, rules: FlowRules, unit: float) -> Chain:
         chain.ahead[i], chain.behind[i] = (i + 1) % n, (i - 1) % n
         chain.live[i] = i
     chain.mother[:n] = -1
-    chain.count[:2] = n
+    chain.tally[:2] = n
     return chain
 
 
 def _loops(chain: Chain, time_s: float) -> Loops:
     """Walk a chain's loops."""
-    left = set(chain.live[: chain.count[1]].tolist())
+    left = set(chain.live[: chain.tally[1]].tolist())
     order: list[int] = []
     first = [0]
-    for i in chain.live[: chain.count[1]].tolist():
+    for i in chain.live[: chain.tally[1]].tolist():
         if i not in left:
             continue
         k = i
@@ -258,11 +258,11 @@ def flow(
             next_show += show_every_s
             if not flowing or _is_stuck(chain, rules.speed * unit):
                 break
-    live = chain.live[: chain.count[1]]
+    live = chain.live[: chain.tally[1]]
     return Flow(
         trails=trails.trails(chain),
         unit_m=unit,
-        relinked=int(chain.count[2]),
+        relinked=int(chain.tally[2]),
         stuck=int(np.count_nonzero(chain.state[live] != DONE)),
         chains=shown,
     )
@@ -270,7 +270,7 @@ def flow(
 
 def _is_stuck(chain: Chain, speed: float) -> bool:
     """Whether what still flows hardly moves."""
-    live = chain.live[: chain.count[1]]
+    live = chain.live[: chain.tally[1]]
     live = live[chain.state[live] == FLOWING]
     return float(np.abs(chain.velocity[live]).max(initial=0.0)) < _STUCK * speed
 
@@ -286,7 +286,7 @@ class _Recorder:
         self._time: list[float] = []
 
     def take(self, chain: Chain, time_s: float) -> None:
-        live = chain.live[: chain.count[1]]
+        live = chain.live[: chain.tally[1]]
         self._number.append(live.copy())
         self._place.append(chain.place[live])
         self._limb.append(chain.limb[live])

@@ -256,7 +256,7 @@ class WoundedStem:
         return float(np.pi * self.wound.radius_m**2 * np.count_nonzero(above) / len(face))
 
     def roughness(self, points: _Floats, normals: _Floats) -> float:
-        """Greatest angle between the surface at points near the wound and the bare stem, degrees."""
+        """Greatest angle between the surface over the wound and the bare stem, degrees."""
         _, aside = self._cut_frame(points)
         height = (points - self.wound.middle) @ self.wound.heading
         near = (aside < 1.5 * self.wound.radius_m) & (height > -0.5 * self.wound.stub_m)

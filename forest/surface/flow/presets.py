@@ -77,8 +77,9 @@ class FeaturePreset(Table):
                     f"{len(row)} values", key=name, expected=f"one for each of {len(self.years)}"
                 )
         for name, row in part:
-            if isinstance(row, tuple) and min(row) < 0.0:
-                raise Refusal(f"{min(row):g}", key=f"{key}.{name}", expected="0 or more")
+            least = float(np.min(row))
+            if least < 0.0:
+                raise Refusal(f"{least:g}", key=f"{key}.{name}", expected="0 or more")
         if self.spots is not None:
             pairs = zip(self.spots.height_m, self.spots.width_m, strict=True)
             if any(h > 2.0 * w * (1.0 + 1e-9) for h, w in pairs):
@@ -95,7 +96,9 @@ class FeaturePreset(Table):
 
     def colour(self, rows: tuple[Colour, ...], age: float) -> Colour:
         """Interpolate a colour at an age, years."""
-        red, green, blue = (float(np.interp(age, self.years, part)) for part in zip(*rows, strict=True))
+        red, green, blue = (
+            float(np.interp(age, self.years, part)) for part in zip(*rows, strict=True)
+        )
         return red, green, blue
 
 
@@ -118,9 +121,7 @@ def feature_preset(name: str) -> FeaturePreset:
         If there is none of this name; the nearest is named.
     """
     if name not in preset_names():
-        raise InputError(
-            f"no flow bark {name!r}, {nearest(name, preset_names())}", where="preset"
-        )
+        raise InputError(f"no flow bark {name!r}, {nearest(name, preset_names())}", where="preset")
     return _shipped(name)
 
 

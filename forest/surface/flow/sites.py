@@ -114,7 +114,9 @@ def sites_of(bark: Bark, cover: Cover, *, year: int | None, age: float | None = 
         along=along,
         across=np.cross(along, cover.normal),
         number=cover.number,
-        age=np.maximum(seen - born, 0).astype(np.float64) if age is None else np.full(len(born), age),
+        age=np.maximum(seen - born, 0).astype(np.float64)
+        if age is None
+        else np.full(len(born), age),
         radius_m=on.radius,
         uv=np.column_stack((turn * on.radius, on.along)),
         spacing_m=cover.spacing_m,
