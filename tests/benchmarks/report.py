@@ -143,10 +143,12 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(f"a thousand parametric aspens, {threads} threads, s", (whole,))
     yield Line("an aspen's moment of wind, ms", (f"{1e3 * forms['sway_s']:.1f}",))
     yield from _frame_lines(result["frames"])
+    yield from _scene_lines(result["scene"])
     skin = result["surfaces"]
     yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
+    yield from _bark_lines(result["bark"])
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
@@ -173,6 +175,21 @@ def _frame_lines(frames: dict[str, Any]) -> Iterator[Line]:
         ("scene_shadow_s", "once a sun: the scene's shadow map, s"),
     ):
         yield Line(what, (f"{frames[key]:.2f}",))
+
+
+def _bark_lines(cases: dict[str, Any]) -> Iterator[Line]:
+    yield Line("Fracture bark, 40 steps", ())
+    for name, case in cases.items():
+        if name != "paper_s":
+            what = f"{name}, {case['elements']:,} elements, s"
+            yield Line(what, (f"{case['wall_s']:.2f}", f"{case['cpu_s']:.2f}"))
+
+
+def _scene_lines(scene: dict[str, Any]) -> Iterator[Line]:
+    what = f"{scene['trees']:,} trees of {scene['shapes']} shapes on {scene['hectares']:.2f} ha"
+    yield Line(f"A scene at stand detail: {what}, a .glb of {scene['megabytes']:.0f} MB", ())
+    yield Line("meshes and file, s", (f"{scene['seconds']:.3g}", f"{scene['cpu_s']:.3g}"))
+    yield Line("peak memory, GB", (f"{scene['peak_gb']:.2f}",))
 
 
 def show(result: dict[str, Any]) -> None:

@@ -13,6 +13,7 @@ from forest.errors import InputError
 from forest.surface.camera import Camera
 from forest.surface.grass import Grass
 from forest.surface.instances import Instances, Model
+from forest.surface.scene import Census
 from forest.surface.terrain import HeightField
 
 RGB = tuple[float, float, float]
@@ -75,10 +76,15 @@ class Scenery:
         By code.
     grass_at : callable
         Code of the grass at places x, y.
+    origin_m : tuple of float
+        What was taken off all x and y, m: `instances`, `terrain`, `extent` and the camera count
+        from here, since what is drawn has single precision.
     extent : (x0, y0, x1, y1)
         The ground that is the scene's own, m; beyond it the ground only goes on.
     sun_azimuth_deg, sun_elevation_deg : float
         From north clockwise, and above the horizon.
+    census : Census, optional
+        Who the trees are, where they have names of their own.
     notes : tuple of str
         What a user should know of how it was made, a line each.
     """
@@ -99,7 +105,9 @@ class Scenery:
     view: Viewpoint = Viewpoint()
     size: tuple[int, int] = (1200, 750)
     seed: int = 1
+    census: Census | None = None
     notes: tuple[str, ...] = ()
+    origin_m: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Check the sun."""
