@@ -20,6 +20,7 @@ from tests.benchmarks import (
     bark,
     bending,
     costs,
+    flow,
     frames,
     machine,
     parametric,
@@ -101,6 +102,7 @@ def measure(extent: Extent) -> dict[str, Any]:
     )
     result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
     result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
+    result["flow"] = _say("bark flow", machine.alone, flow.measure_flow, extent.repeats)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")

@@ -149,6 +149,7 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
     yield from _bark_lines(result["bark"])
+    yield from _flow_lines(result["flow"])
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
@@ -175,6 +176,16 @@ def _frame_lines(frames: dict[str, Any]) -> Iterator[Line]:
         ("scene_shadow_s", "once a sun: the scene's shadow map, s"),
     ):
         yield Line(what, (f"{frames[key]:.2f}",))
+
+
+def _flow_lines(found: dict[str, Any]) -> Iterator[Line]:
+    yield Line("Bark flow", ())
+    for key, what in (
+        ("chain", f"a chain past a branching, {found['particle_steps']:,} steps of particles, s"),
+        ("maple", f"maple bark on a metre of trunk, {found['triangles']:,} triangles, s"),
+        ("wound", f"ten years of a wound under {found['covering']:,} particles, s"),
+    ):
+        yield Line(what, tuple(f"{seconds:.2f}" for seconds in found[key]))
 
 
 def _bark_lines(cases: dict[str, Any]) -> Iterator[Line]:

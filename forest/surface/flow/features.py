@@ -25,10 +25,10 @@ _Floats = NDArray[np.float64]
 #: Limbs thinner than this, in distances of quads, keep no features.
 _THINNEST = 0.5
 #: Quads reach a little beyond the points that they must cover.
-_MARGIN = 1.05
+_MARGIN = 1.08
 #: Points around a site at which its quad's size is measured: rings and points of each.
-_RINGS = (0.35, 0.7, 1.05)
-_PER_RING = 10
+_RINGS = (0.25, 0.45, 0.6, 0.75, 0.9, 1.05)
+_PER_RING = 16
 _FAN = 12
 #: Part of a ribbon's width that its bevelled side takes.
 _BEVEL = 0.25
