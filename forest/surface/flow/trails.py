@@ -103,8 +103,9 @@ def grain(
 ) -> _Floats:
     """Give the direction of the grain at a mesh's points, or at any points on the surface.
 
-    The mean of the nearest points of trails, weighted so that it changes without jumps; where
-    none is within reach, the direction of the limb.
+    The mean of the nearest points of trails, weighted so that it changes without jumps. Points
+    farther than the limb is thick do not count, nor those where particles slid back; where none
+    is left, the grain is the direction of the limb.
 
     Parameters
     ----------
@@ -134,6 +135,9 @@ def grain(
     weight = np.maximum(1.0 - (away / np.maximum(radius, 1e-12)) ** 2, 0.0) ** 2
     weight[~np.isfinite(away)] = 0.0
     ways = trails.heading[moving[np.minimum(near, len(moving) - 1)]]
+    thick = 2.0 * blend.limb(points).radius[:, None]  # what is farther is on another limb
+    backward = np.einsum("nkx,nx->nk", ways, along) < 0.0  # a hanging chain slides back
+    weight[backward | (away > thick)] = 0.0
     mean = tangent(np.einsum("nk,nkx->nx", weight, ways), normals)
     return np.asarray(np.where(np.any(mean != 0.0, axis=1, keepdims=True), mean, along))
 
