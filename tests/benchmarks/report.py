@@ -148,8 +148,15 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
+    whole = f"blended, cells of 1 cm, {skin['blended_triangles']:,} triangles, s"
+    yield Line(whole, (f"{skin['blended_s']:.1f}", f"{skin['blended_cpu_s']:.1f}"))
+    yield Line("most memory held, GiB", (f"{skin['blended_gib']:.1f}",))
     yield from _bark_lines(result["bark"])
     yield from _flow_lines(result["flow"])
+    maps = result["bark_maps"]
+    yield Line(f"Maps of a trunk, {maps['size']} x {maps['size']}", ())
+    for key, what in (("maps", "4K set: textures, maps, s"), ("save", "4K set: its PNGs, s")):
+        yield Line(what, (f"{maps[key + '_s']:.1f}", f"{maps[key + '_cpu_s']:.1f}"))
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
