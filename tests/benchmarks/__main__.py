@@ -21,6 +21,7 @@ from tests.benchmarks import (
     bark_maps,
     bending,
     costs,
+    flow,
     frames,
     machine,
     parametric,
@@ -103,6 +104,7 @@ def measure(extent: Extent) -> dict[str, Any]:
     result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
     result["bark_maps"] = _say("4K set", machine.alone, bark_maps.measure_maps, extent.repeats)
     result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
+    result["flow"] = _say("bark flow", machine.alone, flow.measure_flow, extent.repeats)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
