@@ -20,6 +20,7 @@ from forest.cli.planting import tree
 from forest.cli.reading import info, landscape, picture, stability, table
 from forest.cli.ringing import rings
 from forest.cli.shared import Stopped
+from forest.cli.surfacing import mesh
 from forest.cli.viewing import stand_view
 
 # The class of all wrong usage; which module holds it depends on typer's version.
@@ -52,6 +53,7 @@ for _command in (
     bucking,
     info,
     export,
+    mesh,
     species,
     picture,
     stand_view,

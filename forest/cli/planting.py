@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from forest.cli.shared import Overrides, check_targets
+from forest.cli.surfacing import MESH, working, write_parts
 
 
 def tree(
@@ -16,11 +17,14 @@ def tree(
         str | None, typer.Argument(help="A parametric species, or a TOML file of one.")
     ] = None,
     to: Annotated[
-        Path | None, typer.Option("--to", help="A .vtp, .csv (cylinders), .png or .gif file.")
+        Path | None,
+        typer.Option("--to", help="Mesh .glb, .obj, .ply, .vtp; cylinders .csv; .png; .gif."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Each seed is another tree.")] = 0,
     changes: Overrides = None,
-    leaves: Annotated[bool, typer.Option(help="Whether leaves are drawn.")] = True,
+    leaves: Annotated[
+        bool | None, typer.Option("--leaves/--no-leaves", help="Default: with all but .ply.")
+    ] = None,
     season: Annotated[str, typer.Option(help="spring, summer, fall or winter.")] = "summer",
     time: Annotated[float, typer.Option(help="Moment of the wind, s.")] = 0.0,
     wind: Annotated[float, typer.Option(help="Wind speed, as in the paper.")] = 0.0,
@@ -44,7 +48,7 @@ def tree(
 
         forest tree quaking_aspen --seed 3 --to aspen.png
 
-        forest tree quaking_aspen --set 1Branches=30 --wind 8 --time 2 --to aspen.vtp
+        forest tree quaking_aspen --set 1Branches=30 --wind 8 --time 2 --to aspen.glb
 
         forest tree quaking_aspen --wind 8 --frames 24 --seconds 4 --to sway.gif
     """
@@ -63,7 +67,7 @@ def tree(
             typer.echo(f"{name:<22} {load_parameters(name).common_name}")
         return
     if to is not None:
-        check_targets((to, (".vtp", ".csv", ".png", ".gif")), force=force)
+        check_targets((to, (*MESH, ".csv", ".png", ".gif")), force=force)
     seasons = ("spring", "summer", "fall", "winter")
     if season not in seasons:
         raise InputError(f"unknown season '{season}', {nearest(season, seasons)}")
@@ -90,14 +94,18 @@ def tree(
 
         write_simpleforest(one.skeleton(), to, overwrite=force)
         return
-    from forest.view.parametric_picture import draw_parametric, draw_sway, has_leaves, write_vtp
+    from forest.view.parametric_picture import draw_parametric, draw_sway, mesh_parts
+    from forest.view.tree_mesh import with_leaves
 
-    if to.suffix.lower() == ".vtp":
-        write_vtp(one, to, leaves=leaves and has_leaves(one, season), overwrite=force)
+    shown = with_leaves(to, leaves)
+    if to.suffix.lower() in MESH:
+        with working(f"the surface of {len(one.stems.level):,} stems"):
+            parts = mesh_parts(one, leaves=shown, season=season)
+        write_parts(parts, to, "texture", force)
     elif moving:
-        draw_sway(moments, to, seconds=seconds, leaves=leaves, season=season, overwrite=force)
+        draw_sway(moments, to, seconds=seconds, leaves=shown, season=season, overwrite=force)
     else:
-        draw_parametric(one, to, leaves=leaves, season=season)
+        draw_parametric(one, to, leaves=shown, season=season)
 
 
 def _given(context: typer.Context) -> list[str]:

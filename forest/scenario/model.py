@@ -369,6 +369,12 @@ class SampleTrees(Table):
     at_year: int | None = quantity(
         None, "calendar year of the quantiles; default: the last year", unit="year"
     )
+    meshes: Literal["glb", "obj", "ply", "vtp"] | None = quantity(
+        None,
+        "format in which each tree's surface is written when the run is done, as it was in its "
+        "last year, into the folder RUN_meshes beside the run file",
+        unit="",
+    )
 
 
 class Output(Table):

@@ -5,6 +5,7 @@ from forest.surface.description import Description, Drawing, Primitives, describ
 from forest.surface.detail import Fractions, Sight, fractions
 from forest.surface.frame import Frame, prepare
 from forest.surface.instances import Instances, Model
+from forest.surface.mesh import Mesh
 from forest.surface.shadow import SceneShadow, own_shadows, scene_shadow
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "Fractions",
     "Frame",
     "Instances",
+    "Mesh",
     "Model",
     "Primitives",
     "SceneShadow",

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from forest.parametric import Parameters, ParametricTree
 from forest.parametric.ratios import lobed
 from forest.record.export import whole_file
-from forest.trees.leaves import OUTLINES, Leaves
+from forest.surface.export import Material, Part, leaf_parts
+from forest.surface.tubes import tubes
+from forest.trees.leaves import Leaves
 from forest.view import shapes
 from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, pixels
 from forest.view.shading import LightVolume
-from forest.view.shapes import gather_wood, polylines
+from forest.view.tree_mesh import linear
 
 #: The seasons, and how young the leaves are in each, 0 to 1.
 SEASONS = {"spring": 0.5, "summer": 0.0, "fall": 0.0, "winter": 0.0}
@@ -275,58 +277,27 @@ def _polygons(points: NDArray[np.float64], corners: NDArray[np.int64]) -> Any:
     return import_pyvista().PolyData(points, np.column_stack((np.full(n, k), corners)).ravel())
 
 
-def write_vtp(
-    tree: ParametricTree, to: str | Path, *, leaves: bool = True, overwrite: bool = False
-) -> None:
-    """Write tubes and leaves as a VTK PolyData file.
+def mesh_parts(tree: ParametricTree, *, leaves: bool, season: str = "summer") -> list[Part]:
+    """Give tubes and leaf cards for files of meshes; a trunk with lobes has them.
 
     Parameters
     ----------
     tree : ParametricTree
         The tree.
-    to : path
-        File to write.
     leaves : bool
-        Whether to write the leaves too.
-    overwrite : bool
-        Whether to replace a file.
-
-    Notes
-    -----
-    Cells carry `leaf`, 1 on leaves and 0 on wood. A trunk with lobes has them.
+        Whether to give the leaves too, where the season has any.
+    season : str
+        One of `SEASONS`.
     """
-    pv = import_pyvista()
-    wood = gather_wood([tree.skeleton()])
-    lines = polylines(wood.part(_round(tree)) if is_lobed(tree) else wood)
-    mesh = pv.PolyData()
-    mesh.points, mesh.lines = lines.points, lines.cells
-    mesh["radius"] = np.maximum(lines.radius, 1e-5)
-    mesh.set_active_scalars("radius")
-    tubes = pv.PolyData()
-    if mesh.n_points:
-        tubes = mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES).triangulate()
-        tubes.clear_data()
-    if is_lobed(tree):
-        trunk = _polygons(*lobed_trunk(tree)).triangulate()
-        tubes = trunk.append_polydata(tubes) if tubes.n_points else trunk
-    tubes.cell_data["leaf"] = np.zeros(tubes.n_cells, np.uint8)
-    if leaves and len(tree.leaves.stem):
-        corners = _outlines(tree.leaves, tree.parameters.leaf_shape)
-        n, k = corners.shape[:2]
-        cards = _polygons(corners.reshape(-1, 3), np.arange(k * n).reshape(n, k))
-        cards.cell_data["leaf"] = np.ones(n, np.uint8)
-        tubes = tubes.append_polydata(cards)
-    with whole_file(to, overwrite=overwrite) as draft:
-        tubes.save(draft)
-
-
-def _outlines(leaves: Leaves, shape: int) -> NDArray[np.float64]:
-    """Give the corners (n, k, 3) of all leaves' outlines."""
-    along = leaves.direction * leaves.length[:, None]
-    across = np.cross(leaves.normal, leaves.direction) * leaves.width[:, None]
-    x, y = OUTLINES[shape].T
-    bent = along[:, None] * x[None, :, None] + across[:, None] * y[None, :, None]
-    return np.asarray(leaves.position[:, None] + bent, np.float64)
+    lobes = (tree.parameters.lobes, tree.parameters.lobe_depth) if is_lobed(tree) else (0, 0.0)
+    wood = tubes(tree.skeleton(), lobes=lobes, lobed_orders=_lobed_levels(tree))
+    bark = colour_of(tree.parameters.bark_colour)
+    parts = [Part(wood, Material("wood", colour=linear(bark.tolist())))]
+    if leaves and has_leaves(tree, season):
+        parts += leaf_parts(
+            tree.leaves, colour=linear(leaf_colour(tree.parameters, season).tolist())
+        )
+    return parts
 
 
 def _blades(tree: ParametricTree, season: str) -> tuple[Blades, float]:

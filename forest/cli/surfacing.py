@@ -1,0 +1,103 @@
+"""The command that writes the surface of a tree for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from forest.cli.shared import RunFile, check_targets
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from forest.surface.export import Part
+
+#: Formats of meshes that commands write.
+MESH = (".glb", ".obj", ".ply", ".vtp")
+
+
+def mesh(
+    run_file: RunFile,
+    tree: Annotated[int, typer.Option(metavar="ID", help="A sample tree.")],
+    to: Annotated[
+        Path, typer.Option(metavar="FILE", help=".glb, .obj, .ply, .vtp, or .png for a picture.")
+    ],
+    year: Annotated[
+        int | None, typer.Option(help="Default: the last in which it is on record.")
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(metavar="M", help="How far tubes may be off round and straight.")
+    ] = 0.001,
+    leaves: Annotated[
+        bool | None,
+        typer.Option("--leaves/--no-leaves", help="Leaf cards; default: with all but .ply."),
+    ] = None,
+    colour: Annotated[
+        str, typer.Option(help="Of a .png: texture, radius_m, order or birth_year.")
+    ] = "texture",
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Write the wood of a sample tree as a closed surface, and its leaves as cards.
+
+    A .glb is for viewers and game engines, an .obj for modelling programs, a .ply for measuring,
+    a .vtp for ParaView; their points carry radius, branching order and year of birth.
+
+    Examples:
+
+        forest mesh run.h5 --tree 12 --to tree.glb
+
+        forest mesh run.h5 --tree 12 --year 2040 --to wood.ply
+
+        forest mesh run.h5 --tree 12 --to orders.png --colour order
+    """
+    from forest.record.run import open_run
+    from forest.surface.tubes import tubes
+    from forest.trees.leaves import leaves_of
+    from forest.view.tree_mesh import species_of, tree_parts, with_leaves
+
+    check_targets((to, (*MESH, ".png")), force=force)
+    with open_run(run_file) as run:
+        _check_sample(run, tree)
+        at = int(run.sample_years(tree)[-1]) if year is None else year
+        skeleton = run.skeleton(tree, at)
+        species = species_of(run, skeleton)
+    with working(f"the surface of {len(skeleton):,} internodes"):
+        wood = tubes(skeleton, tolerance_m=tolerance)
+        cards = leaves_of(skeleton, species) if with_leaves(to, leaves) else None
+        parts = tree_parts(wood, skeleton, cards)
+    write_parts(parts, to, colour, force)
+    triangles = sum(len(part.mesh.triangles) for part in parts)
+    typer.echo(f"{to}: {triangles:,} triangles, tree {tree} in {at}, {wood.volume:.4g} m3 of wood")
+
+
+def write_parts(parts: Sequence[Part], to: Path, colour: str, force: bool) -> None:
+    """Write a mesh's file, or draw it."""
+    with working(f"writing {to.name}"):
+        if to.suffix.lower() == ".png":
+            from forest.view.surface_picture import draw_mesh
+
+            draw_mesh(parts, to, colour_by=colour, overwrite=force)
+            return
+        from forest.surface.export import write_mesh
+
+        write_mesh(parts, to, overwrite=force)
+
+
+def working(what: str) -> Any:
+    """Show on a terminal what is being done, while it is."""
+    from rich.console import Console
+
+    return Console(stderr=True).status(what)
+
+
+def _check_sample(run: Any, tree: int) -> None:
+    from forest.errors import InputError
+
+    if tree not in run.samples:
+        near = min(run.samples, key=lambda known: abs(known - tree), default=None)
+        expected = "a run with output.sample_trees"
+        if near is not None:
+            expected = f"one of its {len(run.samples)} sample trees, the nearest number is {near}"
+        raise InputError(f"tree {tree} is no sample tree", where=str(run.path), expected=expected)

@@ -1,0 +1,89 @@
+"""One tree's wood and leaves as parts of a mesh file, in its species' colours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from forest.record.run import Run
+from forest.species import Species
+from forest.surface.export import Material, Part, leaf_parts, write_mesh
+from forest.surface.mesh import Mesh
+from forest.surface.tubes import tubes
+from forest.trees.leaves import Leaves, leaves_of
+from forest.trees.skeleton import Skeleton
+from forest.view.looks import look_of
+
+_WITHOUT_LEAVES = (".ply",)  # for measuring closed wood
+
+
+def with_leaves(to: Path, wanted: bool | None = None) -> bool:
+    """Tell whether a file shows leaves: as wanted, else all formats but .ply."""
+    return to.suffix.lower() not in _WITHOUT_LEAVES if wanted is None else wanted
+
+
+def linear(colour: Sequence[float]) -> tuple[float, float, float]:
+    """Give an sRGB colour, 0 to 1, as the linear one that materials have."""
+    c = np.asarray(colour, np.float64)
+    red, green, blue = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).tolist()
+    return red, green, blue
+
+
+def species_of(run: Run, skeleton: Skeleton) -> Species:
+    """Find the species of a run's tree."""
+    return next(s for s in run.scenario.species_list if s.name == skeleton.species)
+
+
+def tree_parts(wood: Mesh, skeleton: Skeleton, leaves: Leaves | None) -> list[Part]:
+    """Put a tree's wood and leaves together, coloured as its species is in pictures.
+
+    Parameters
+    ----------
+    wood : Mesh
+        The surface of its wood.
+    skeleton : Skeleton
+        The tree.
+    leaves : Leaves, optional
+        Its leaves, if they are to be seen.
+    """
+    look = look_of(skeleton.species)
+    parts = [Part(wood, Material("wood", colour=linear(look.bark)))]
+    if leaves is not None:
+        parts += leaf_parts(leaves, tree_id=skeleton.tree_id, colour=linear(look.leaf))
+    return parts
+
+
+def write_samples(run: Run, suffix: str) -> list[Path]:
+    """Write tubes of all sample trees of a run, each as it was in its last year on record.
+
+    Parameters
+    ----------
+    run : Run
+        The run, finished or not.
+    suffix : str
+        Format, one of `forest.surface.export.SUFFIXES`.
+
+    Returns
+    -------
+    list of Path
+        ``tree_ID_YEAR`` in the folder ``RUN_meshes`` beside the run file; files of these names
+        are replaced.
+    """
+    folder = meshes_folder(run.path)
+    folder.mkdir(exist_ok=True)
+    written = []
+    for tree_id in run.samples:
+        year = int(run.sample_years(tree_id)[-1])
+        skeleton = run.skeleton(tree_id, year)
+        to = folder / f"tree_{tree_id}_{year}{suffix}"
+        leaves = leaves_of(skeleton, species_of(run, skeleton)) if with_leaves(to) else None
+        parts = tree_parts(tubes(skeleton), skeleton, leaves)
+        written.append(write_mesh(parts, to, overwrite=True))
+    return written
+
+
+def meshes_folder(run_file: Path) -> Path:
+    """Name the folder for meshes of a run's sample trees: ``run_meshes`` beside ``run.h5``."""
+    return run_file.with_name(f"{run_file.stem}_meshes")
