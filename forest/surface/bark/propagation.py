@@ -154,7 +154,7 @@ def _step(
     if rings.axis[to] == rings.axis[s]:
         straight = x_of(rings.edges[to], turn)
         turn += _bend(rings, physics, s, to, runs, straight)
-        run = abs(rings.along[to] - rings.along[s])
+        run = 0.5 * (rings.width[to] + rings.width[s])
         turn += _stray(rings, physics, seed, fracture, to) * run / rings.girth[to]
     x = x_of(rings.edges[to], turn)
     near, side, gap = _around(rings, to, x)
