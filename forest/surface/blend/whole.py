@@ -1,0 +1,266 @@
+"""A tree's blended surface as one closed mesh."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest.errors import InputError, nearest
+from forest.surface.blend.cells import CELLS_IN_RADIUS, SLOPE, cells_near, check_memory, lattice_of
+from forest.surface.blend.cones import Limbs, Reaction, check, limbs_of
+from forest.surface.blend.crossings import crossings
+from forest.surface.blend.field import Blend
+from forest.surface.blend.foot import Flare, usual_flare
+from forest.surface.blend.polygonise import march
+from forest.surface.blend.twigs import Twigs, twigs_of
+from forest.surface.blend.weld import Welded, weld
+from forest.surface.frames import carry_frames
+from forest.surface.mesh import Mesh
+from forest.trees.skeleton import Skeleton
+
+_Floats = NDArray[np.float64]
+
+READINGS = ("corrected", "paper")
+#: Limbs thinner than this radius, in cells, are tubes.
+THINNEST = 2.0
+#: Usual cells are this part of the radius at the ground, but within these bounds, m.
+_USUAL_PART, _USUAL_LEAST, _USUAL_MOST = 0.1, 0.001, 0.02
+_TRIES = 3
+
+
+class CrossingWarning(UserWarning):
+    """Limbs cross: the mesh is closed, but has handles."""
+
+
+def usual_cell(skeleton: Skeleton) -> float:
+    """Give the cell's width for a tree of this size, m."""
+    check(skeleton)
+    base = float(skeleton.radius[skeleton.parent < 0].max(initial=0.0))
+    return float(np.clip(_USUAL_PART * base, _USUAL_LEAST, _USUAL_MOST))
+
+
+def blend_of(
+    skeleton: Skeleton,
+    *,
+    thinnest_m: float = 0.0,
+    reaction: Reaction | None = None,
+    flare: Flare | str | None = "usual",
+    readings: str = "corrected",
+) -> Blend:
+    """Make the implicit function of a tree's surface.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The tree, whoever made it.
+    thinnest_m : float
+        Internodes thinner than this radius that bear none so thick are left out.
+    reaction : Reaction, optional
+        Reaction wood (eq. 31), e.g. of `reaction_wood`.
+    flare : Flare, "usual" or None
+        Root flare; the usual one is `Flare()` from a radius of 5 cm at the ground on.
+    readings : "corrected" or "paper"
+        Whether eq. 30 is mended (see docs/surfaces.md) or kept as printed.
+
+    Raises
+    ------
+    InputError
+        If the skeleton has no surface, or a word is unknown.
+    """
+    if readings not in READINGS:
+        raise InputError(f"unknown readings {readings!r}, {nearest(readings, READINGS)}")
+    check(skeleton)
+    if isinstance(flare, str):
+        if flare != "usual":
+            raise InputError(f"unknown flare {flare!r}", expected="'usual', None or a Flare")
+        flare = usual_flare(skeleton)
+    if reaction is not None and len(reaction.reach_m) != int(skeleton.axis.max()) + 1:
+        raise InputError(
+            f"reaction wood of {len(reaction.reach_m)} axes",
+            where="reaction",
+            expected=f"that of the skeleton's {int(skeleton.axis.max()) + 1} axes",
+        )
+    limbs = limbs_of(
+        skeleton,
+        thinnest_m=thinnest_m,
+        reaction=reaction,
+        flare=None if flare is None else flare.columns(skeleton),
+    )
+    return Blend.of(limbs, printed=readings == "paper")
+
+
+def blended(
+    skeleton: Skeleton,
+    *,
+    cell_m: float | None = None,
+    reaction: Reaction | None = None,
+    flare: Flare | str | None = "usual",
+    readings: str = "corrected",
+    cells_in_radius: float = CELLS_IN_RADIUS,
+    strict: bool = False,
+) -> Mesh:
+    """Make one closed mesh of a tree, its limbs blended where they branch.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The tree, whoever made it.
+    cell_m : float, optional
+        Width of the smallest cell, m; thicker limbs have cells up to a third of their radius,
+        and what is thinner than two cells in radius is a tube of few sides, welded in. Without it
+        a tenth of the radius at the ground, but 1 mm to 2 cm.
+    reaction : Reaction, optional
+        Reaction wood, e.g. of `reaction_wood`.
+    flare : Flare, "usual" or None
+        Root flare; the usual one is `Flare()` from a radius of 5 cm at the ground on.
+    readings : "corrected" or "paper"
+        Whether eq. 30 is mended (see docs/surfaces.md) or kept as printed.
+    cells_in_radius : float
+        How many cells, at least, the radius of a thick limb is.
+    strict : bool
+        Whether to refuse limbs that cross away from a joint; else they are warned of.
+
+    Returns
+    -------
+    Mesh
+        Closed, oriented outward, of one part per stem from the ground, with texture coordinates
+        and `forest.surface.mesh.POINT_DATA` of the nearest limb.
+
+    Raises
+    ------
+    InputError
+        If the skeleton has no surface, the cells are too large for the tree or too small for the
+        memory (said before anything is made), or limbs cross and `strict` is set.
+
+    Notes
+    -----
+    Hart & Baker 2003, sections 5.1 and 5.2, eqs 26 to 31.
+    """
+    check(skeleton)
+    cell_m = usual_cell(skeleton) if cell_m is None else float(cell_m)
+    if not (np.isfinite(cell_m) and cell_m > 0.0):
+        raise InputError(f"a cell of {cell_m} m", where="cell_m", expected="a width above 0")
+    if not 1.0 <= cells_in_radius <= 50.0:
+        raise InputError(f"{cells_in_radius}", where="cells_in_radius", expected="1 to 50")
+    blend = blend_of(
+        skeleton,
+        thinnest_m=THINNEST * cell_m,
+        reaction=reaction,
+        flare=flare,
+        readings=readings,
+    )
+    check_memory(blend.limbs.cones, cell_m, cells_in_radius)
+    _tell_crossings(blend, strict)
+    points, triangles = _closed(blend, cell_m, cells_in_radius)
+    _, side = carry_frames(skeleton)
+    twigs = twigs_of(skeleton, blend, side, cell_m)
+    return _dressed(skeleton, blend, weld(points, triangles, twigs), twigs, side)
+
+
+def _tell_crossings(blend: Blend, strict: bool) -> None:
+    pairs = crossings(blend)
+    if not len(pairs):
+        return
+    first = ", ".join(f"{a} and {b}" for a, b in pairs[:3])
+    text = f"{len(pairs)} pairs of axes cross away from their joints: {first}"
+    if strict:
+        raise InputError(text, where="skeleton", expected="axes that meet at joints alone")
+    warnings.warn(text + "; the mesh has a handle at each", CrossingWarning, stacklevel=3)
+
+
+def _closed(
+    blend: Blend, cell_m: float, cells_in_radius: float
+) -> tuple[_Floats, NDArray[np.int32]]:
+    """Polygonise; where cells were left out that the surface passes, look for more of them."""
+    lattice = lattice_of(blend.limbs.cones, cell_m, cells_in_radius)
+    slope = SLOPE
+    for _ in range(_TRIES):
+        leaves = cells_near(blend, lattice, cells_in_radius, slope)
+        points, triangles = march(blend, lattice, leaves)
+        if Mesh(points, triangles, np.zeros((0, 3, 2))).is_watertight:
+            break
+        slope *= 1.6
+    return _wood_alone(blend, points, triangles)
+
+
+def _wood_alone(
+    blend: Blend, points: _Floats, triangles: NDArray[np.int32]
+) -> tuple[_Floats, NDArray[np.int32]]:
+    """Drop hollows enclosed in the wood, and crumbs: one part stays per stem from the ground."""
+    part = Mesh(points, triangles, np.zeros((0, 3, 2))).components()
+    stems = int(np.sum(np.isfinite(blend.limbs.cones.ground)))
+    if part.max(initial=0) + 1 <= 1:
+        return points, triangles
+    a, b, c = (points[triangles[:, k]] - points.mean(axis=0) for k in range(3))
+    volume = np.bincount(part, np.sum(a * np.cross(b, c), axis=1))
+    stay = np.argsort(-volume, kind="stable")[: max(stems, 1)]
+    triangles = triangles[np.isin(part, stay[volume[stay] > 0.0])]
+    needed = np.zeros(len(points), np.bool_)
+    needed[triangles.ravel()] = True
+    return points[needed], (np.cumsum(needed) - 1)[triangles].astype(np.int32)
+
+
+def _dressed(skeleton: Skeleton, blend: Blend, welded: Welded, twigs: Twigs, side: _Floats) -> Mesh:
+    """Add texture coordinates and the arrays of points."""
+    limb = welded.ring < 0
+    found = blend.limb(welded.point[limb])
+    internode = np.empty(len(welded.point), np.int64)
+    radius = np.empty(len(welded.point))
+    internode[limb] = blend.limbs.internode(found.axis, found.along)
+    radius[limb] = found.radius
+    internode[~limb] = twigs.internode[welded.ring[~limb]]
+    radius[~limb] = twigs.radius[welded.ring[~limb]]
+    uv = welded.uv
+    uv[welded.blended] = _unrolled(blend, side, welded.point[welded.triangle[welded.blended]])
+    return Mesh(
+        welded.point,
+        welded.triangle,
+        uv,
+        {
+            "radius_m": radius.astype(np.float32),
+            "order": skeleton.order[internode].astype(np.int32),
+            "birth_year": skeleton.birth_year[internode].astype(np.int32),
+            "tree_id": np.full(len(internode), skeleton.tree_id, np.int32),
+            "axis": skeleton.axis[internode].astype(np.int32),
+        },
+    )
+
+
+def _cone_sides(limbs: Limbs, side: _Floats) -> tuple[_Floats, _Floats]:
+    """Give the carried direction across each cone at its start and its end."""
+    cones = limbs.cones
+    length = np.linalg.norm(cones.end - cones.start, axis=1)
+    small = 1e-6 * length + 2e-9
+    low = side[limbs.internode(cones.axis, cones.along + small)]
+    high = side[limbs.internode(cones.axis, cones.along + length + small)]
+    return low, high
+
+
+def _unrolled(blend: Blend, side: _Floats, corners: _Floats) -> _Floats:
+    """Texture coordinates (m, 3, 2) of triangles on the limb nearest to each one's middle."""
+    cones = blend.limbs.cones
+    middle = blend.limb(corners.mean(axis=1))
+    low, high = _cone_sides(blend.limbs, side)
+    uv = np.empty((len(corners), 3, 2))
+    angle = np.empty((len(corners), 3))
+    for k in range(3):
+        own = blend.limb(corners[:, k])
+        which = np.where(own.axis == middle.axis, own.cone, middle.cone)
+        line = cones.end[which] - cones.start[which]
+        length = np.linalg.norm(line, axis=1)
+        heading = line / length[:, None]
+        offset = corners[:, k] - cones.start[which]
+        along = np.sum(offset * heading, axis=1)
+        t = np.clip(along / length, 0.0, 1.0)
+        across = (1.0 - t)[:, None] * low[which] + t[:, None] * high[which]
+        across -= np.sum(across * heading, axis=1)[:, None] * heading
+        beside = np.cross(heading, across)
+        angle[:, k] = np.arctan2(np.sum(offset * beside, axis=1), np.sum(offset * across, axis=1))
+        uv[:, k, 0] = cones.low[which] + t * (cones.high[which] - cones.low[which])
+        uv[:, k, 1] = cones.along[which] + along
+    turn = angle - angle[:, :1]
+    angle -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+    uv[:, :, 0] *= angle
+    return uv
