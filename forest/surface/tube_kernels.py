@@ -174,7 +174,7 @@ def unfold(first: Any, place: Any, radius: Any, keep: Any) -> None:
                 a = w
             else:
                 keep[b] = False
-                a = max(w, begin)  # what is below may now fold
+                a = w  # what is below may now fold
 
 
 @njit

@@ -16,7 +16,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.benchmarks import bending, costs, frames, machine, parametric, report, runs, stands
+from tests.benchmarks import (
+    bending,
+    costs,
+    frames,
+    machine,
+    parametric,
+    report,
+    runs,
+    stands,
+    surfaces,
+)
 
 
 class Extent(NamedTuple):
@@ -76,6 +86,7 @@ def measure(extent: Extent) -> dict[str, Any]:
         extent.frame_trees,
         extent.repeats,
     )
+    result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")

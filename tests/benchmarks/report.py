@@ -143,6 +143,10 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(f"a thousand parametric aspens, {threads} threads, s", (whole,))
     yield Line("an aspen's moment of wind, ms", (f"{1e3 * forms['sway_s']:.1f}",))
     yield from _frame_lines(result["frames"])
+    skin = result["surfaces"]
+    yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
+    tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
+    yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")

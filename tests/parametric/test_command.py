@@ -39,8 +39,16 @@ def test_tubes_and_leaves(tmp_path: Path) -> None:
         to = tmp_path / f"palm{option}.vtp"
         assert _forest("queen_palm", "--seed", "1", option, "--to", str(to)) == 0
         mesh = pyvista.read(to)
-        assert int(mesh.cell_data["leaf"].sum()) == leaves
+        assert int(mesh.cell_data["leaf"].sum()) == 2 * leaves
         assert mesh.bounds[5] == pytest.approx(palm.nodes.position[:, 2].max(), abs=1.5)
+
+
+def test_a_closed_surface(tmp_path: Path) -> None:
+    import trimesh
+
+    to = tmp_path / "cactus.ply"
+    assert _forest("saguaro", "--to", str(to)) == 0
+    assert trimesh.load(to).is_watertight
 
 
 def test_picture(tmp_path: Path) -> None:
@@ -113,7 +121,7 @@ def test_species_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         (["quaking_aspn"], "did you mean 'quaking_aspen'?"),
         (["lilac", "--season", "sumer"], "did you mean 'summer'?"),
         (["lilac", "--readings", "mine"], "unknown readings 'mine'"),
-        (["lilac", "--to", "lilac.obj"], "unknown format '.obj'"),
+        (["lilac", "--to", "lilac.stl"], "unknown format '.stl'"),
         (["lilac", "--seed", "-1"], "seed -1 is not allowed"),
         (["lilac", "--set", "1CurveRes=0"], "level[1].segments: 0 is not allowed"),
         (["lilac", "--set", "ScaleV=4.5"], "smaller than nothing"),

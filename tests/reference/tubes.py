@@ -110,7 +110,8 @@ def _reach(nodes: list[Node], k: int, piece: int) -> Vector:
         return np.zeros(3)
     before = _unit(nodes[k].place - nodes[k - 1].place)
     after = _unit(nodes[k + 1].place - nodes[k].place)
-    half = 0.5 * math.acos(min(max(float(before @ after), -1.0), 1.0))
+    cosine = min(max(float(before @ after), 1e-9 - 1.0), 1.0)  # one that turns back has no bend
+    half = 0.5 * math.acos(cosine)
     bend = after - before
     across = bend - (bend @ _unit(before + after)) * _unit(before + after)
     return nodes[k].radius * math.tan(half) * _unit(across) / math.cos(half)

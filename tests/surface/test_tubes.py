@@ -33,6 +33,13 @@ def _stem(places: np.ndarray, radius: np.ndarray) -> Skeleton:
     )
 
 
+def _nudged(tree: Skeleton, seed: int) -> Skeleton:
+    """Move all ends a little: where wood turns back on itself, rounding would decide."""
+    end = tree.end + np.random.default_rng(seed).normal(0.0, 0.01, tree.end.shape)
+    start = np.where((tree.parent >= 0)[:, None], end[tree.parent], tree.start)
+    return replace(tree, start=start, end=end)
+
+
 def _pole(n: int = 5, radius: float = 0.1) -> Skeleton:
     places = np.linspace((3.0, 4.0, 0.0), (3.0, 4.0, 2.0), n + 1)
     return _stem(places, np.full(n, radius))
@@ -41,7 +48,7 @@ def _pole(n: int = 5, radius: float = 0.1) -> Skeleton:
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 40), tolerance=st.sampled_from([0.0, 0.02]))
 def test_the_nodes_are_those_of_the_twin(seed: int, n: int, tolerance: float) -> None:
-    tree = bush(seed, n)
+    tree = _nudged(bush(seed, n), seed)
     axes = [unfolded(thinned(a, tolerance)) for a in axes_of(tree, max(tolerance, 1e-9))]
     if not axes:
         with pytest.raises(InputError, match="no axis of any length"):

@@ -1,0 +1,127 @@
+"""Pictures of meshes, the command that writes them, and meshes at the end of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from forest.errors import InputError
+from forest.simulation import simulate
+from forest.surface.export import Material, Part, leaf_parts
+from forest.surface.tubes import tubes
+from forest.trees.leaves import leaves_of
+from forest.view.surface_picture import draw_mesh
+from forest.view.tree_mesh import species_of
+from tests.surface.bushes import bush
+from tests.tiny import forest, tiny
+
+
+@pytest.fixture(scope="module")
+def run_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    to = tmp_path_factory.mktemp("runs") / "tiny.h5"
+    simulate(tiny("output.sample_trees.meshes=ply"), to).close()
+    return to
+
+
+def _pixels(to: Path) -> np.ndarray:
+    return np.asarray(Image.open(to).convert("RGB"), np.float64)
+
+
+def test_meshes_of_sample_trees_are_written_at_the_end(run_file: Path) -> None:
+    from forest import open_run
+
+    with open_run(run_file) as run:
+        years = {tree_id: int(run.sample_years(tree_id)[-1]) for tree_id in run.samples}
+    folder = run_file.with_name("tiny_meshes")
+    assert {p.name for p in folder.iterdir()} == {f"tree_{i}_{y}.ply" for i, y in years.items()}
+    for path in folder.iterdir():
+        assert trimesh.load(path).is_watertight
+
+
+def test_a_resumed_run_may_ask_for_other_meshes(tmp_path: Path) -> None:
+    to = tmp_path / "run.h5"
+    simulate(tiny("years=3"), to).close()
+    assert not (tmp_path / "run_meshes").exists()
+    simulate(tiny("years=4", "output.sample_trees.meshes=vtp"), to, resume=True).close()
+    assert all(p.suffix == ".vtp" for p in (tmp_path / "run_meshes").iterdir())
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".obj", ".ply", ".vtp", ".png"])
+def test_the_command_writes_a_sample_tree(run_file: Path, tmp_path: Path, suffix: str) -> None:
+    to = tmp_path / f"tree{suffix}"
+    code, out, err = forest("mesh", run_file, "--tree", "1", "--to", to)
+    assert (code, err) == (0, "")
+    assert "tree 1 in 2008" in out
+    assert to.stat().st_size > 1000
+    assert forest("mesh", run_file, "--tree", "1", "--to", to)[0] == 2  # exists already
+    assert forest("mesh", run_file, "--tree", "1", "--to", to, "--force")[0] == 0
+    if suffix == ".ply":
+        bare, green = trimesh.load(to), tmp_path / "green.ply"
+        assert bare.is_watertight
+        forest("mesh", run_file, "--tree", "1", "--to", green, "--leaves")
+        assert len(trimesh.load(green, process=False).faces) > len(bare.faces)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--tree", "9999", "--to", "x.glb"), "tree 9999 is no sample tree; expected one of its"),
+        (("--tree", "1", "--to", "x.stl"), "unknown format '.stl'"),
+        (("--tree", "1", "--to", "x.glb", "--year", "1900"), "not on record in 1900"),
+        (("--tree", "1", "--to", "x.png", "--colour", "radius"), "did you mean 'radius_m'?"),
+        (("--tree", "1", "--to", "x.glb", "--tolerance", "-1"), "tolerance_m is -1"),
+    ],
+)
+def test_the_command_refuses(
+    run_file: Path, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    words = tuple(str(tmp_path / w) if w.startswith("x.") else w for w in words)
+    code, _, err = forest("mesh", run_file, *words)
+    assert code == 2
+    assert said in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_tree_without_cards_is_left_by_colouring(run_file: Path, tmp_path: Path) -> None:
+    from forest import open_run
+
+    with open_run(run_file) as run:
+        skeleton = run.skeleton(1, 2008)
+        leaves = leaves_of(skeleton, species_of(run, skeleton))
+    parts = [Part(tubes(skeleton)), *leaf_parts(leaves)]
+    seen = {}
+    for colour in ("texture", "order"):
+        draw_mesh(parts, tmp_path / "tree.png", colour_by=colour, window=(120, 160))
+        seen[colour] = np.any(_pixels(tmp_path / "tree.png")[:100, 40:] < 250.0, axis=2).sum()
+    assert seen["texture"] > 1.5 * seen["order"] > 0
+
+
+def test_light_comes_from_where_it_is_said(tmp_path: Path) -> None:
+    wood = tubes(bush(3, 8), tolerance_m=0.0)
+    bumps = np.full((4, 4, 3), (128, 128, 255), np.uint8)
+    for material in (Material("plain", colour=(0.5, 0.5, 0.5)), Material("b", normal_image=bumps)):
+        means = []
+        for side in (-1.0, 1.0):
+            to = tmp_path / "pole.png"
+            draw_mesh(
+                [Part(wood, material)], to, window=(80, 80), light=(side, 0.0, 0.0), bearing_deg=0.0
+            )
+            grey = _pixels(to).mean(axis=2)
+            means.append(grey[grey < 250.0].mean())
+        assert means[1] > means[0] + 20.0  # seen from the east, light from the east
+
+
+def test_bad_pictures_are_refused(tmp_path: Path) -> None:
+    wood = tubes(bush(3, 10))
+    with pytest.raises(InputError, match="cannot colour by 'ordr', did you mean 'order'"):
+        draw_mesh(wood, tmp_path / "x.png", colour_by="ordr")
+    bare = type(wood)(wood.points, wood.triangles, wood.uv)
+    with pytest.raises(InputError, match="the mesh has no 'order'"):
+        draw_mesh(bare, tmp_path / "x.png", colour_by="order")
+    with pytest.raises(InputError, match="nothing to draw"):
+        draw_mesh([], tmp_path / "x.png")
+    assert not list(tmp_path.iterdir())
