@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
+
 from forest.parametric import ParametricTree, grow
 from forest.scenario import Scenario
 from forest.stand import Stand
 from forest.surface import Camera, Instances, Model, prepare, scene_shadow
+from forest.surface.bark import Material, StripGeometry, grow_bark
 from forest.surface.detail import SEASONS
 
 _YEARS = 3
@@ -58,6 +61,12 @@ def _view(tree: ParametricTree) -> None:
     prepare([model], one, Camera((0, -60, 2), (0, 0, 2)), sun=sun, shadows=shadows)
 
 
+def _tear() -> None:
+    """Grow a little bark, and tear it by hand."""
+    girth = np.array([0.1, 0.11])[:, None] * np.ones(3)
+    grow_bark(StripGeometry.column(3, 0.02), girth, Material(threshold=2.0)).trigger(1, 0.05)
+
+
 def main() -> None:
     """Grow the tiny stands and a shrub, look at it, and say how long each took."""
     stand = Scenario.from_toml(_STAND, where="forest.warm")
@@ -73,6 +82,10 @@ def main() -> None:
     tree = grow("lilac")
     tree.swayed(1.0, 1.0)
     _view(tree)
+    print(f"{time.perf_counter() - start:.1f} s", flush=True)
+    start = time.perf_counter()
+    print("kernels: bark ... ", end="", flush=True)
+    _tear()
     print(f"{time.perf_counter() - start:.1f} s", flush=True)
 
 

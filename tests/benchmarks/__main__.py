@@ -16,6 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
+<<<<<<< HEAD
 from tests.benchmarks import (
     bending,
     costs,
@@ -27,6 +28,9 @@ from tests.benchmarks import (
     stands,
     surfaces,
 )
+=======
+from tests.benchmarks import bark, bending, costs, frames, machine, parametric, report, runs, stands
+>>>>>>> cab0d683de733c39e926790db334a5e580d023c0
 
 
 class Extent(NamedTuple):
@@ -86,7 +90,11 @@ def measure(extent: Extent) -> dict[str, Any]:
         extent.frame_trees,
         extent.repeats,
     )
+<<<<<<< HEAD
     result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
+=======
+    result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
+>>>>>>> cab0d683de733c39e926790db334a5e580d023c0
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")

@@ -143,10 +143,14 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(f"a thousand parametric aspens, {threads} threads, s", (whole,))
     yield Line("an aspen's moment of wind, ms", (f"{1e3 * forms['sway_s']:.1f}",))
     yield from _frame_lines(result["frames"])
+<<<<<<< HEAD
     skin = result["surfaces"]
     yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
+=======
+    yield from _bark_lines(result["bark"])
+>>>>>>> cab0d683de733c39e926790db334a5e580d023c0
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
@@ -173,6 +177,14 @@ def _frame_lines(frames: dict[str, Any]) -> Iterator[Line]:
         ("scene_shadow_s", "once a sun: the scene's shadow map, s"),
     ):
         yield Line(what, (f"{frames[key]:.2f}",))
+
+
+def _bark_lines(cases: dict[str, Any]) -> Iterator[Line]:
+    yield Line("Fracture bark, 40 steps", ())
+    for name, case in cases.items():
+        if name != "paper_s":
+            what = f"{name}, {case['elements']:,} elements, s"
+            yield Line(what, (f"{case['wall_s']:.2f}", f"{case['cpu_s']:.2f}"))
 
 
 def show(result: dict[str, Any]) -> None:

@@ -60,6 +60,7 @@ def verdicts(result: dict[str, Any]) -> Iterator[Verdict]:
         yield Verdict("a frame of 10,000 trees, s", frame["shaded_s"], "≤", 2.0)
     surfaces = result["surfaces"]
     yield Verdict("tubes of 50,000 internodes, s", surfaces["tubes_s"], "≤", 1.0)
+    yield Verdict("bark of 225 strips, s", result["bark"]["225 strips"]["wall_s"], "≤", 2.0)
     yield Verdict("share of writing", run["writing_share"], "≤", 0.10)
     yield Verdict("cold start, s", starts["cold_s"], "≤", 45.0)
     yield Verdict("warm start, s", starts["warm_s"], "≤", 2.0)

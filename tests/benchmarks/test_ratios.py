@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tests.benchmarks.bark import measure_bark
 from tests.benchmarks.costs import exponent, measure_stand, thread_counts
 from tests.benchmarks.frames import measure_frames
 from tests.benchmarks.machine import alone
@@ -44,3 +45,11 @@ def test_a_frame_costs_what_it_draws() -> None:
     few, many = (alone(measure_frames, trees, 3)["threads"][1] for trees in (300, 3000))
     assert many["million_cpu_s"] <= 1.5 * few["million_cpu_s"]
     assert many["shaded_s"] <= 2.5 * many["plain_s"]
+
+
+def test_bark_costs_what_its_elements_do() -> None:
+    """Sixteen times the strips, or four times the fractures: an element costs the same."""
+    found = alone(measure_bark, 3)
+    for more in ("3600 strips", "225 strips, four times the fractures"):
+        assert found[more]["element_us"] <= 1.5 * found["225 strips"]["element_us"]
+    assert found["225 strips"]["wall_s"] * 20 < found["paper_s"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +63,7 @@ def grow_ring(
     per stiffness is its strain; a fracture opens by `spacing` times the strain.
     """
     opened: dict[float, float] = {}
-    for before, girth in zip(girths, girths[1:], strict=False):
+    for before, girth in pairwise(girths):
         limit = girth / before - 1.0
         rest = dict(opened)
         while True:

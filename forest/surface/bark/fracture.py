@@ -51,7 +51,7 @@ def _weigh(rings: Any, physics: Any, seed: Any, weakness: Any, s: Any) -> None:
 @driver
 def weigh_all(first: Any, step: Any, rings: Any, physics: Any, seed: Any, weakness: Any) -> None:
     """Draw the strength of all grains."""
-    n = len(rings.count)
+    n = len(rings.records)
     for chunk in range(first, CHUNKS, step):
         for s in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
             _weigh(rings, physics, seed, weakness, s)
@@ -65,7 +65,7 @@ def nearest_fracture(rings: Any, s: Any, i: Any, side: Any) -> Any:
     the search goes around the ring.
     """
     first = rings.base[s]
-    n = rings.count[s]
+    n = rings.records[s]
     k = i - first if side < 0 else i - first + 1
     for _ in range(n):
         turns = k // n  # -1, 0 or 1
@@ -108,11 +108,11 @@ def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
     middle = 0.5 * (lo + hi)
     rings.weak[i] = middle
     rings.tough[i] = _FAR
-    best = -1
+    best: Any = np.int64(-1)
     least = np.inf
-    first = max(np.int64(lo / physics.grain_m), 0)
-    for j in range(first, min(np.int64(hi / physics.grain_m) + 1, rings.cell[s + 1] - cells)):
-        k = cells + j
+    first: Any = cells + max(np.int64(lo / physics.grain_m), 0)
+    last: Any = min(cells + np.int64(hi / physics.grain_m) + 1, rings.cell[s + 1])
+    for k in range(first, last):
         if not lo < rings.spot[k] < hi:
             continue
         strength = physics.place_jitter * rings.drawn[k] - rings.weakness[k]
@@ -130,10 +130,10 @@ def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
 @njit
 def worst_piece(rings: Any, physics: Any, s: Any) -> Any:
     """Find the piece of a strip most beyond its threshold: its record, or -1."""
-    worst = np.int64(-1)
+    worst: Any = np.int64(-1)
     most = 1.0 + 1e-9  # growth ratios carry rounding
     floor = np.exp(-_MOST * physics.threshold_jitter)
-    for i in range(rings.base[s], rings.base[s] + rings.count[s]):
+    for i in range(rings.base[s], rings.base[s] + rings.records[s]):
         load = overload(rings, s, i)
         if load <= floor:
             continue
@@ -159,7 +159,7 @@ def tear(rings: Any, s: Any, i: Any, place: Any, fracture: Any, time: Any) -> An
     place = np.round(place / GRAIN_M) * GRAIN_M - rings.place[i]
     place = rings.place[i] + min(max(place, GRAIN_M), rest - GRAIN_M)
     part = (place - rings.place[i]) / rest
-    end = rings.base[s] + rings.count[s]
+    end = rings.base[s] + rings.records[s]
     right = rings.left[i] + rings.open[i]
     following = rings.grip_left[i + 1] if i + 1 < end else rings.grip_left[rings.base[s]]
     if i + 1 == end:
@@ -169,7 +169,7 @@ def tear(rings: Any, s: Any, i: Any, place: Any, fracture: Any, time: Any) -> An
     k = i + 1
     tears = rings.totals[0]
     rings.totals[0] += 1
-    rings.count[s] += 1
+    rings.records[s] += 1
     rings.place[k] = place
     rings.rest[k] = 0.0
     rings.open[k] = 0.0
@@ -211,7 +211,7 @@ def settle(rings: Any, physics: Any, s: Any) -> None:
     for sign in (-1.0, 1.0):
         if sign > 0.0:
             solve_strip(rings, physics, s)
-        for i in range(rings.base[s], rings.base[s] + rings.count[s]):
+        for i in range(rings.base[s], rings.base[s] + rings.records[s]):
             if rings.tear[i] >= 0:
                 opened = rings.open[i] * rings.width[s]
                 rings.area[rings.tear_fracture[rings.tear[i]]] += sign * opened

@@ -11,14 +11,19 @@ from numpy.typing import NDArray
 
 from forest._threads import in_threads
 from forest.errors import InputError
+from forest.surface.bark.checks import (
+    check_threshold,
+    checked_dilatation,
+    checked_girths,
+    checked_weakness,
+    girths_from_birth,
+)
 from forest.surface.bark.fracture import room_to_break, weigh_all
-from forest.surface.bark.material import Material, Physics, fracture_range
+from forest.surface.bark.material import Material, Physics
 from forest.surface.bark.propagation import begin_fracture, tear_all
-from forest.surface.bark.rings import Rings, solve_strip, stretch_all, turn_of
+from forest.surface.bark.rings import Rings, copied, stretch_all, turn_of
 from forest.surface.bark.strips import (
-    EPIDERMIS,
     FRACTURE,
-    GRAIN_M,
     Crossings,
     Elements,
     Fractures,
@@ -26,13 +31,12 @@ from forest.surface.bark.strips import (
     Strips,
     Tears,
 )
+from forest.surface.bark.tables import elements_of, tables_of
+from forest.surface.bark.whole import whole_rings
 
 #: By how much the memory of a fast year fades in the next, where the threshold is the growth ratio:
 #: bark strained in a fast year does not break up all over in a slow one.
 FADE = 0.8
-
-_LEAST_SITES = 8  # vertices tied to the substrate around a ring, where it grips
-_MOST_SITES = 128
 
 
 class Snapshot(NamedTuple):
@@ -47,8 +51,8 @@ class Snapshot(NamedTuple):
 class Bark:
     """Bark at one time. Its verbs give another bark; this one stays as it is.
 
-    Memory: 81 bytes an element (two to a fracture), and inside 104 bytes a possible fracture and
-    12 a grain of epidermis.
+    Memory: 49 bytes an element (two to a fracture), and inside 136 bytes a possible fracture (one
+    to each `least_piece_m` of epidermis) and 12 a grain.
     """
 
     geometry: StripGeometry
@@ -92,10 +96,10 @@ class Bark:
         -------
         Bark
         """
-        rings = Rings(*(column.copy() for column in self._rings))
-        girths = _girths(girth_by_step, len(rings.count), rings.girth)
-        spread = _dilatation(dilatation, len(girths), len(rings.count))
-        _check_threshold(self.material, np.vstack([rings.girth, girths]), rings.length, substeps)
+        rings = copied(self._rings)
+        girths = checked_girths(girth_by_step, len(rings.records), rings.girth)
+        spread = checked_dilatation(dilatation, len(girths), len(rings.records))
+        check_threshold(self.material, np.vstack([rings.girth, girths]), rings.length, substeps)
         pace, history = self._pace.copy(), list(self.history)
         time = self.time
         for step, girth in enumerate(girths):
@@ -104,7 +108,7 @@ class Bark:
                 rings = _advance(self, rings, part.girth, spread(step), pace, substeps, time_now)
             time += 1.0
             if keep:
-                history.append(Snapshot(time, rings.girth.copy(), _elements(rings)))
+                history.append(Snapshot(time, rings.girth.copy(), elements_of(rings)))
         return replace(_seen(self, rings, time), history=tuple(history), _pace=pace)
 
     def trigger(self, strip: int, x: float) -> Bark:
@@ -119,9 +123,9 @@ class Bark:
             raise InputError(
                 f"no strip {strip}", where="trigger", expected=f"0 to {len(self.strips.axis) - 1}"
             )
-        rings = Rings(*(column.copy() for column in self._rings))
+        rings = copied(self._rings)
         physics = Physics.of(self.material)
-        lo, hi = int(rings.base[strip]), int(rings.base[strip] + rings.count[strip])
+        lo, hi = int(rings.base[strip]), int(rings.base[strip] + rings.records[strip])
         begin = rings.left[lo]
         around = begin + (x - begin) % rings.girth[strip]
         record = lo + int(np.searchsorted(rings.left[lo:hi], around, side="right")) - 1
@@ -133,7 +137,7 @@ class Bark:
             raise InputError(
                 f"no room for a fracture at {x:g} m in strip {strip}",
                 where="trigger",
-                expected=f"a place {self.material.least_piece_m:g} m or more from the next fracture",
+                expected=f"{self.material.least_piece_m:g} m or more to the next fracture",
             )
         # What has opened so far stays open; the strain that is left tears on.
         rings.rest[:] = rings.open
@@ -152,7 +156,7 @@ class Bark:
         seed: int | None = None,
         keep: bool = False,
     ) -> Bark:
-        """Let the whole surface be the epidermis of another bark, weak where this one is torn (figure 9).
+        """Let the surface be the epidermis of another bark, weak where this one tore (figure 9).
 
         Parameters
         ----------
@@ -238,99 +242,15 @@ def grow_bark(
         range of 3.2.3.
     """
     material = material or Material()
-    girths = np.array(girth_by_step, np.float64)
     strips = len(geometry.axis)
-    if girths.ndim != 2 or girths.shape[1] != strips or len(girths) < 1:
-        raise _refused(
-            f"a table of {girths.shape}", f"(steps + 1, {strips}): a row a step, a column a strip"
-        )
-    known = ~np.isnan(girths)
-    if not known.any(axis=0).all():
-        raise _refused(f"strip {int(np.argmin(known.any(axis=0)))} has no girth", "one or more")
-    born = np.take_along_axis(girths, known.argmax(axis=0)[None], axis=0)[0]
-    girths = np.where(np.cumsum(known, axis=0) > 0, girths, born)
-    map_of = np.zeros((strips, 0)) if weakness is None else np.asarray(weakness, np.float64)
-    if map_of.ndim != 2 or len(map_of) != strips or not np.all((map_of >= 0) & (map_of <= 1)):
-        raise InputError(
-            f"a table of {map_of.shape}",
-            where="bark: weakness",
-            expected=f"({strips}, samples), numbers from 0 to 1",
-        )
+    girths = girths_from_birth(girth_by_step, strips)
+    map_of = checked_weakness(weakness, strips)
     sectors = 1 if dilatation is None else np.shape(dilatation)[-1]
-    _girths(girths[:1], strips, None)
-    rings = _whole(geometry, girths[0], material, sectors)
+    rings = whole_rings(geometry, girths[0], material, sectors)
     physics = Physics.of(material)
     in_threads(weigh_all, rings, physics, np.int64(seed), map_of)
     bark = _first(geometry, material, seed, rings)
     return bark.grow(girths[1:], dilatation=dilatation, substeps=substeps, keep=keep)
-
-
-def _whole(
-    geometry: StripGeometry, girth: NDArray[np.float64], material: Material, sectors: int
-) -> Rings:
-    """Make rings of whole epidermis."""
-    n = len(girth)
-    length = np.floor(girth / GRAIN_M) * GRAIN_M
-    sites = np.ones(n, np.int64)
-    if material.attachment > 0.0:
-        # Displacements fade over sqrt(R / K_a); two vertices to each such length.
-        fading = np.sqrt(material.stiffness / material.attachment)
-        sites = np.clip(np.ceil(2.0 * length / fading), _LEAST_SITES, _MOST_SITES).astype(np.int64)
-    most = np.floor(length / material.least_piece_m).astype(np.int64) + 2
-    base = np.concatenate([[0], np.cumsum(sites + most)])
-    grains = np.ceil(length / material.grain_m).astype(np.int64)
-    cell = np.concatenate([[0], np.cumsum(grains)])
-    tears = int(most.sum())
-
-    def records() -> NDArray[np.float64]:
-        return np.zeros(base[-1])
-
-    rings = Rings(
-        axis=np.array(geometry.axis, np.int32),
-        along=np.array(geometry.along, np.float64),
-        width=np.array(geometry.width, np.float64),
-        up=np.array(geometry.neighbour_up, np.int32),
-        down=np.array(geometry.neighbour_down, np.int32),
-        factor=np.array(geometry.width_around, np.float64),
-        length=length,
-        girth=girth.copy(),
-        edges=girth[:, None] * np.linspace(0.0, 1.0, sectors + 1),
-        limit=np.zeros(n),
-        base=base[:-1],
-        count=sites,
-        cell=cell,
-        spot=np.zeros(cell[-1], np.float32),
-        drawn=np.zeros(cell[-1], np.float32),
-        weakness=np.zeros(cell[-1], np.float32),
-        **{name: records() for name in _RECORDS},
-        tear=np.full(base[-1], -1, np.int32),
-        tear_strip=np.zeros(tears, np.int32),
-        tear_place=np.zeros(tears),
-        tear_up=np.zeros(tears, np.int32),
-        tear_down=np.zeros(tears, np.int32),
-        tear_fracture=np.zeros(tears, np.int32),
-        tear_born=np.zeros(tears),
-        origin=np.zeros(tears, np.int32),
-        first=np.zeros(tears, np.int32),
-        last=np.zeros(tears, np.int32),
-        reach=np.zeros(tears),
-        area=np.zeros(tears),
-        totals=np.zeros(2, np.int64),
-    )
-    physics = Physics.of(material)
-    rings.weak[:] = np.nan
-    for s in range(n):
-        rows = slice(base[s], base[s] + sites[s])
-        at = np.round(np.arange(sites[s]) * (length[s] / sites[s]) / GRAIN_M) * GRAIN_M
-        rings.place[rows] = at
-        rings.left[rows] = rings.grip_left[rows] = rings.grip_right[rows] = at * (
-            girth[s] / length[s]
-        )
-        solve_strip(rings, physics, np.int64(s))
-    return rings
-
-
-_RECORDS = ("place", "rest", "open", "left", "piece", "grip_left", "grip_right", "weak", "tough")
 
 
 class _Part(NamedTuple):
@@ -390,84 +310,6 @@ def _stretched(
     return stretched
 
 
-def _girths(
-    girth_by_step: NDArray[np.float64], strips: int, before: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
-    """Check girths: a row a step, a column a strip, above 0, never shrinking."""
-    girths = np.asarray(girth_by_step, np.float64)
-    if girths.ndim != 2 or girths.shape[1] != strips:
-        raise _refused(f"a table of {girths.shape}", f"(steps, {strips})")
-    if not np.all(np.isfinite(girths) & (girths > 1e-6)):
-        raise _refused("a girth that is not above 0", "metres")
-    if before is not None:
-        change = np.diff(np.vstack([before, girths]), axis=0)
-        if np.any(change < 0.0):
-            step, strip = (int(k[0]) for k in np.nonzero(change < 0.0))
-            raise _refused(
-                f"the girth of strip {strip} shrinks in step {step}", "one that grows or stays"
-            )
-    return girths
-
-
-class _Spread(NamedTuple):
-    """How the girth's growth is shared out around it, step by step."""
-
-    table: NDArray[np.float64] | None
-
-    def __call__(self, step: int) -> NDArray[np.float64] | None:
-        if self.table is None or self.table.ndim == 2:
-            return self.table
-        spread: NDArray[np.float64] = self.table[step]
-        return spread
-
-
-def _dilatation(table: NDArray[np.float64] | None, steps: int, strips: int) -> _Spread:
-    """Check a dilatation."""
-    if table is None:
-        return _Spread(None)
-    table = np.asarray(table, np.float64)
-    shapes = ((strips,), (steps, strips))
-    if table.shape[:-1] not in shapes or table.shape[-1] < 1:
-        raise InputError(
-            f"a table of {table.shape}",
-            where="bark: dilatation",
-            expected=f"({strips}, sectors) or ({steps}, {strips}, sectors)",
-        )
-    if not np.all(np.isfinite(table) & (table >= 0.0)) or not np.all(table.sum(axis=-1) > 0.0):
-        raise InputError(
-            "a number below 0, or a strip of noughts",
-            where="bark: dilatation",
-            expected="sectors that stretch",
-        )
-    return _Spread(table)
-
-
-def _check_threshold(
-    material: Material,
-    girths: NDArray[np.float64],
-    length: NDArray[np.float64],
-    substeps: int,
-) -> None:
-    """Refuse a threshold below the range in which one fracture relieves a ring (3.2.3)."""
-    threshold = material.threshold
-    if threshold is None or len(girths) < 2:
-        return
-    growth = (girths[1:] / girths[:-1]) ** (1.0 / substeps)
-    bound = fracture_range(material, growth, length)
-    if np.any((growth > 1.0) & (threshold <= bound)):
-        most = np.unravel_index(np.argmax(bound), bound.shape)
-        raise InputError(
-            f"threshold S = {threshold:g} lets the bark break without end",
-            where="bark material: threshold",
-            expected=f"S above {bound[most]:.6g}, and below the growth ratio {growth[most]:.6g}"
-            " for any fracture in that step; or no threshold",
-        )
-
-
-def _refused(what: str, expected: str) -> InputError:
-    return InputError(what, where="bark: girth_by_step", expected=expected)
-
-
 def _first(geometry: StripGeometry, material: Material, seed: int, rings: Rings) -> Bark:
     """Give bark whose epidermis is whole."""
     empty: Any = None
@@ -492,102 +334,19 @@ def _first(geometry: StripGeometry, material: Material, seed: int, rings: Rings)
 def _sorted(crossings: Crossings) -> Crossings:
     """Order passages by strip, as the kernel looks them up."""
     order = np.argsort(crossings.strip, kind="stable")
-    return Crossings(*(np.ascontiguousarray(column[order]) for column in crossings))
+    columns: list[Any] = [np.ascontiguousarray(column[order]) for column in crossings]
+    return Crossings(*columns)
 
 
 def _seen(bark: Bark, rings: Rings, time: float) -> Bark:
     """Show rings as tables."""
-    tears, fractures = (int(k) for k in rings.totals)
-    of = rings.tear_fracture[:tears]
-    reach = rings.reach[:fractures].copy()
-    elements = _elements(rings)
-    opened = np.flatnonzero(elements.kind == FRACTURE)
-    strip_of = np.repeat(np.arange(len(rings.count)), np.diff(elements.offsets))[opened]
-    area = np.bincount(
-        elements.fracture[opened],
-        weights=elements.width[opened] * rings.width[strip_of],
-        minlength=fractures,
-    )
-    origin = rings.origin[:fractures].copy()
+    strips, elements, tears, fractures = tables_of(rings, bark.generation)
     return replace(
         bark,
-        strips=Strips(
-            axis=rings.axis,
-            along=rings.along,
-            width=rings.width,
-            girth=rings.girth.copy(),
-            rest=rings.length,
-            neighbour_up=rings.up,
-            neighbour_down=rings.down,
-        ),
+        strips=strips,
         elements=elements,
-        tears=Tears(
-            strip=rings.tear_strip[:tears].copy(),
-            uv0=rings.tear_place[:tears].copy(),
-            up=rings.tear_up[:tears].copy(),
-            down=rings.tear_down[:tears].copy(),
-            fracture=of.copy(),
-            born=rings.tear_born[:tears].copy(),
-        ),
-        fractures=Fractures(
-            origin=origin,
-            first=rings.first[:fractures].copy(),
-            last=rings.last[:fractures].copy(),
-            strips=np.bincount(of, minlength=fractures).astype(np.int32),
-            length=reach,
-            width=area / reach,
-            born=rings.tear_born[origin],
-            generation=np.full(fractures, bark.generation, np.int32),
-        ),
+        tears=tears,
+        fractures=fractures,
         time=time,
         _rings=rings,
     )
-
-
-def _elements(rings: Rings) -> Elements:
-    """Show records as elements: what lies between two fractures is one piece of epidermis."""
-    n = len(rings.count)
-    strip_of = np.repeat(np.arange(n), rings.count)
-    first = np.concatenate([[0], np.cumsum(rings.count)])[:-1]
-    record = rings.base[strip_of] + np.arange(len(strip_of)) - first[strip_of]
-    record = record[rings.tear[record] >= 0]
-    strip = strip_of[
-        rings.tear[rings.base[strip_of] + np.arange(len(strip_of)) - first[strip_of]] >= 0
-    ]
-    torn = np.bincount(strip, minlength=n)
-    offsets = np.concatenate([[0], np.cumsum(np.maximum(2 * torn, 1))]).astype(np.int64)
-    # The fracture before each one around its ring: for the first, the last one a turn back.
-    begins = np.concatenate([[0], np.cumsum(torn)])
-    k = np.arange(len(record))
-    wraps = k == begins[strip]
-    before = record[np.where(wraps, begins[strip + 1] - 1, k - 1)]
-    start = rings.left[before] + rings.open[before] - wraps * rings.girth[strip]
-    epidermis = offsets[strip] + 2 * (k - begins[strip])
-    tear = rings.tear[record]
-
-    size = int(offsets[-1])
-    kind = np.full(size, EPIDERMIS, np.int8)
-    columns = {name: np.zeros(size) for name in ("start", "width", "rest", "uv0", "born")}
-    fracture, tears = np.full(size, -1, np.int32), np.full(size, -1, np.int32)
-    whole = np.flatnonzero(torn == 0)
-    columns["start"][offsets[whole]] = rings.left[rings.base[whole]]
-    columns["width"][offsets[whole]] = rings.girth[whole]
-    columns["rest"][offsets[whole]] = rings.length[whole]
-    columns["start"][epidermis] = start
-    columns["width"][epidermis] = rings.left[record] - start
-    columns["rest"][epidermis] = rings.place[record] - (
-        rings.place[before] - wraps * rings.length[strip]
-    )
-    columns["uv0"][epidermis] = rings.place[before]
-    columns["born"][epidermis] = np.maximum(
-        rings.tear_born[tear], rings.tear_born[rings.tear[before]]
-    )
-    kind[epidermis + 1] = FRACTURE
-    columns["start"][epidermis + 1] = rings.left[record]
-    columns["width"][epidermis + 1] = rings.open[record]
-    columns["rest"][epidermis + 1] = rings.rest[record]
-    columns["uv0"][epidermis + 1] = rings.place[record]
-    columns["born"][epidermis + 1] = rings.tear_born[tear]
-    fracture[epidermis + 1] = rings.tear_fracture[tear]
-    tears[epidermis + 1] = tear
-    return Elements(offsets=offsets, kind=kind, fracture=fracture, tear=tears, **columns)

@@ -19,9 +19,9 @@ _STRAY = np.int64(2)  # what a draw is for: four ids to an axis
 @njit
 def _record_of(rings: Any, node: Any) -> Any:
     """Find the record of a tear: a strip's places rise."""
-    s = rings.tear_strip[node]
+    s = np.int64(rings.tear_strip[node])
     lo = rings.base[s]
-    hi = lo + rings.count[s]
+    hi = lo + rings.records[s]
     place = rings.tear_place[node]
     while hi - lo > 1:
         middle = (lo + hi) // 2
@@ -36,7 +36,7 @@ def _record_of(rings: Any, node: Any) -> Any:
 def _piece_at(rings: Any, s: Any, x: Any) -> Any:
     """Find the record at or before x m around the girth, and x within its turn."""
     lo = rings.base[s]
-    hi = lo + rings.count[s]
+    hi = lo + rings.records[s]
     begin = rings.left[lo]
     x = begin + (x - begin) - np.floor((x - begin) / rings.girth[s]) * rings.girth[s]
     while hi - lo > 1:
@@ -55,7 +55,15 @@ def _next_strip(rings: Any, crossings: Any, s: Any, runs: Any, turn: Any) -> Any
     A passage to another axis goes before the neighbour on the same one: the fracture stops at
     the branch and goes on along it (5.3).
     """
-    for row in range(np.searchsorted(crossings.strip, s), len(crossings.strip)):
+    row = 0
+    above = len(crossings.strip)
+    while row < above:  # the first row of the strip
+        middle = (row + above) // 2
+        if crossings.strip[middle] < s:
+            row = middle + 1
+        else:
+            above = middle
+    for row in range(above, len(crossings.strip)):
         if crossings.strip[row] != s:
             break
         off = turn - crossings.angle[row]
@@ -107,10 +115,10 @@ def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any) -> Any:
     j, side, gap = _around(rings, to, x)
     if j < 0 or side == 0:
         return 0.0
-    node = rings.tear[j]
-    if gap >= physics.influence * _mean_width(rings, rings.tear_fracture[node]):
+    node = np.int64(rings.tear[j])
+    if gap >= physics.influence * _mean_width(rings, np.int64(rings.tear_fracture[node])):
         return 0.0
-    back = rings.tear_down[node] if runs > 0 else rings.tear_up[node]
+    back = np.int64(rings.tear_down[node] if runs > 0 else rings.tear_up[node])
     if back < 0 or rings.tear_strip[back] != s:
         return 0.0
     k = _record_of(rings, back)
@@ -128,9 +136,9 @@ def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any) -> Any:
 def _stray(rings: Any, physics: Any, seed: Any, fracture: Any, to: Any) -> Any:
     """Slope by which a fracture leaves its course; the same within a row of grains."""
     row = np.int64(np.floor(rings.along[to] / physics.grain_along_m))
-    origin = rings.origin[fracture]
+    origin = np.int64(rings.origin[fracture])
     number = np.int64(rings.tear_place[origin] / physics.least_piece_m)
-    strip = rings.tear_strip[origin]
+    strip = np.int64(rings.tear_strip[origin])
     where = np.int64(np.floor(rings.along[strip] / physics.grain_along_m))
     name = 4 * np.int64(rings.axis[to]) + _STRAY
     drawn, _, _, _ = uniforms(seed, STREAM_BARK, name, row + 65536 * where, number)
@@ -142,8 +150,8 @@ def _step(
     rings: Any, physics: Any, seed: Any, crossings: Any, node: Any, runs: Any, time: Any
 ) -> Any:
     """Try to break the strip next to a fracture's end. Returns the tear (-1) and its direction."""
-    s = rings.tear_strip[node]
-    fracture = rings.tear_fracture[node]
+    s = np.int64(rings.tear_strip[node])
+    fracture = np.int64(rings.tear_fracture[node])
     i = _record_of(rings, node)
     x = rings.left[i] + 0.5 * rings.open[i]
     turn = turn_of(rings.edges[s], rings.girth[s], x)
@@ -159,7 +167,7 @@ def _step(
     x = x_of(rings.edges[to], turn)
     near, side, gap = _around(rings, to, x)
     if near >= 0:
-        other = rings.tear_fracture[rings.tear[near]]
+        other = np.int64(rings.tear_fracture[rings.tear[near]])
         if side == 0 or gap < physics.stand_off * _mean_width(rings, other):
             return none, goes
     k, x = _piece_at(rings, to, x)
@@ -180,26 +188,27 @@ def _step(
 
 @njit
 def run_on(
-    rings: Any, physics: Any, seed: Any, crossings: Any, fracture: Any, upper: Any, time: Any
+    rings: Any, physics: Any, seed: Any, crossings: Any, fracture: Any, end: Any, time: Any
 ) -> None:
-    """Let one end of a fracture run from strip to strip as long as it can break the next.
+    """Let the upper (+1) or lower (-1) end of a fracture run on from strip to strip.
 
     It can while its length over its width exceeds the Inglis threshold, and the next strip bears
     at least the `arrest` share of what would break it unaided.
     """
+    upper = end > 0
     node = np.int64(rings.last[fracture] if upper else rings.first[fracture])
     ahead = rings.tear_up[node] if upper else rings.tear_down[node]
     behind = rings.tear_down[node] if upper else rings.tear_up[node]
-    runs = _UP if upper else _DOWN
+    runs = end
     if ahead >= 0 and behind < 0 and rings.first[fracture] != rings.last[fracture]:
         runs = -runs  # it came over a passage that turned it round
     run = 0.0
     while True:
         reach = rings.reach[fracture]
         opened = rings.area[fracture]
-        if reach >= physics.flaw_m:
-            if run > physics.run_m or not reach * reach > physics.inglis * opened:
-                return
+        stops = run > physics.run_m or not reach * reach > physics.inglis * opened
+        if reach >= physics.flaw_m and stops:
+            return
         new, goes = _step(rings, physics, seed, crossings, node, runs, time)
         if new < 0:
             return
@@ -215,7 +224,7 @@ def run_on(
             rings.last[fracture] = new
         else:
             rings.first[fracture] = new
-        to = rings.tear_strip[new]
+        to = np.int64(rings.tear_strip[new])
         rings.reach[fracture] += rings.width[to]
         run += rings.width[to]
         settle(rings, physics, to)
@@ -247,8 +256,8 @@ def begin_fracture(
     rings.reach[fracture] = rings.width[s]
     rings.area[fracture] = 0.0
     settle(rings, physics, s)
-    run_on(rings, physics, seed, crossings, fracture, True, time)
-    run_on(rings, physics, seed, crossings, fracture, False, time)
+    run_on(rings, physics, seed, crossings, fracture, _UP, time)
+    run_on(rings, physics, seed, crossings, fracture, _DOWN, time)
     return fracture
 
 
@@ -262,14 +271,14 @@ def tear_all(rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, ti
     """
     for f in range(rings.totals[1]):
         rings.area[f] = 0.0
-    for s in range(len(rings.count)):
-        for i in range(rings.base[s], rings.base[s] + rings.count[s]):
+    for s in range(len(rings.records)):
+        for i in range(rings.base[s], rings.base[s] + rings.records[s]):
             if rings.tear[i] >= 0:
                 f = rings.tear_fracture[rings.tear[i]]
                 rings.area[f] += rings.open[i] * rings.width[s]
     for f in range(rings.totals[1]):
-        run_on(rings, physics, seed, crossings, f, True, time)
-        run_on(rings, physics, seed, crossings, f, False, time)
+        run_on(rings, physics, seed, crossings, f, _UP, time)
+        run_on(rings, physics, seed, crossings, f, _DOWN, time)
     for s in order:
         while True:
             i = worst_piece(rings, physics, s)

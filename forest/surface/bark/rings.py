@@ -19,7 +19,7 @@ CHUNKS = 64  # of strips; fixed, so that results do not depend on the number of 
 
 
 class Rings(NamedTuple):
-    """Strips, records, tears and fractures as growable columns (76 bytes a record, 28 a tear)."""
+    """Strips, records (76 bytes), tears (32) and fractures (28) as columns that kernels change."""
 
     # one row per strip
     axis: NDArray[np.int32]
@@ -35,7 +35,7 @@ class Rings(NamedTuple):
     ]  # (strips, sectors + 1) where the sectors of growth end, m from the seam
     limit: NDArray[np.float64]  # S - 1 in this step
     base: NDArray[np.int64]  # first record
-    count: NDArray[np.int64]  # records
+    records: NDArray[np.int64]  # how many
     cell: NDArray[np.int64]  # (strips + 1) first grain
     # one row per grain of epidermis
     spot: NDArray[np.float32]  # where in it the weakest place is, m
@@ -68,12 +68,27 @@ class Rings(NamedTuple):
     totals: NDArray[np.int64]  # (2) tears, fractures
 
 
+def copied(rings: Rings) -> Rings:
+    """Give rings that can be changed while the old ones stay."""
+    columns: list[Any] = [column.copy() for column in rings]
+    return Rings(*columns)
+
+
+@njit
+def _sector_of(edges: Any, x: Any) -> Any:
+    """Find the sector in which x lies."""
+    j = 0
+    while j + 2 < len(edges) and edges[j + 1] <= x:
+        j += 1
+    return j
+
+
 @njit
 def turn_of(edges: Any, girth: Any, x: Any) -> Any:
     """Give the part of a turn at x m around the girth; every sector takes an equal part."""
     sectors = len(edges) - 1
     x = x - np.floor(x / girth) * girth
-    j = min(max(np.searchsorted(edges, x, side="right") - 1, 0), sectors - 1)
+    j = _sector_of(edges, x)
     return min((j + (x - edges[j]) / (edges[j + 1] - edges[j])) / sectors, 1.0)
 
 
@@ -82,7 +97,7 @@ def x_of(edges: Any, turn: Any) -> Any:
     """Give the m around the girth of a part of a turn (taken modulo 1)."""
     sectors = len(edges) - 1
     at = (turn - np.floor(turn)) * sectors
-    j = min(np.int64(at), sectors - 1)
+    j: Any = min(np.int64(at), sectors - 1)
     return edges[j] + (at - j) * (edges[j + 1] - edges[j])
 
 
@@ -92,7 +107,7 @@ def _carried(old: Any, new: Any, x: Any) -> Any:
     sectors = len(old) - 1
     turns = np.floor(x / old[sectors])
     r = x - turns * old[sectors]
-    j = min(max(np.searchsorted(old, r, side="right") - 1, 0), sectors - 1)
+    j = _sector_of(old, r)
     part = (r - old[j]) / (old[j + 1] - old[j])
     return turns * new[sectors] + new[j] + part * (new[j + 1] - new[j])
 
@@ -100,7 +115,7 @@ def _carried(old: Any, new: Any, x: Any) -> Any:
 @njit
 def rest_of(rings: Any, s: Any, i: Any) -> Any:
     """Own length of the piece behind record i (row of the columns) of strip s."""
-    end = rings.base[s] + rings.count[s]
+    end = rings.base[s] + rings.records[s]
     return (rings.place[i + 1] if i + 1 < end else rings.length[s]) - rings.place[i]
 
 
@@ -123,7 +138,7 @@ def fracture_stiffness(physics: Any, width: Any) -> Any:
 def solve_strip(rings: Any, physics: Any, s: Any) -> None:
     """Bring one strip to equilibrium (3.2.2, 5.1): K = R w / l0 for pieces, K_f w for fractures."""
     first = rings.base[s]
-    n = rings.count[s]
+    n = rings.records[s]
     girth = rings.girth[s]
     edges = rings.edges[s]
     factor = rings.factor[s]
@@ -175,7 +190,7 @@ def _stretch(rings: Any, physics: Any, girth: Any, edges: Any, s: Any) -> None:
     The places where vertices are tied move with the substrate; before, they are reset to where
     the vertices had come to lie (long-term plasticity, 5.1).
     """
-    for i in range(rings.base[s], rings.base[s] + rings.count[s]):
+    for i in range(rings.base[s], rings.base[s] + rings.records[s]):
         rings.rest[i] = rings.open[i]
         rings.grip_left[i] = _carried(rings.edges[s], edges[s], rings.left[i])
         rings.grip_right[i] = _carried(rings.edges[s], edges[s], rings.left[i] + rings.open[i])
@@ -202,7 +217,7 @@ def _stretch_chunk(
     for s in range(lo, hi):
         _stretch(rings, physics, girth, edges, s)
         worst[s] = 0.0
-        for i in range(rings.base[s], rings.base[s] + rings.count[s]):
+        for i in range(rings.base[s], rings.base[s] + rings.records[s]):
             worst[s] = max(worst[s], overload(rings, s, i))
 
 

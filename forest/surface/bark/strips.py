@@ -7,7 +7,7 @@ and Neyret 2002, 3.2.2). Fractures of neighbouring strips that were torn one fro
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ class StripGeometry(NamedTuple):
         k = np.arange(strips, dtype=np.int32)
         return cls(
             axis=np.zeros(strips, np.int32),
-            along=(k + 0.5) * width_m,
+            along=np.asarray((k + 0.5) * width_m, np.float64),
             width=np.full(strips, width_m),
             neighbour_up=np.where(k + 1 < strips, k + 1, -1).astype(np.int32),
             neighbour_down=(k - 1).astype(np.int32),
@@ -112,7 +112,7 @@ class Elements(NamedTuple):
     def of(self, strip: int) -> Elements:
         """Give one strip's elements (views)."""
         a, b = int(self.offsets[strip]), int(self.offsets[strip + 1])
-        rest = (column[a:b] for column in self[1:])
+        rest: list[Any] = [column[a:b] for column in self[1:]]
         return Elements(np.array([0, b - a]), *rest)
 
     def at(
