@@ -92,6 +92,32 @@ def grow_preset(
     return bark
 
 
+def relief_of(preset: Preset, girth: NDArray[np.float64], *, generation: int, seed: int) -> Relief:
+    """Give the relief of fractures for points of stems of some girth (n,)."""
+    carving = preset.carving
+    aged = preset.aged(girth)
+    return Relief(
+        depth=aged["depth_m"] * carving.again_depth**generation,
+        per_width=aged["per_width"],
+        shoulder=aged["shoulder"],
+        reach=np.full(len(girth), carving.reach_m),
+        fray=aged["fray_m"],
+        profile=profile_of(carving.profile),
+        opening=OPENINGS.index(carving.opening),
+        fray_length=carving.fray_length_m,
+        seed=seed + generation,
+    )
+
+
+def rows_at(preset: Preset, v: NDArray[np.float64], girth: NDArray[np.float64]) -> Rows:
+    """Give what changes from row to row; `girth` is that of the stem it stands for."""
+    aged = preset.aged(girth)
+    names = ("old_skin", "old_inside", "grime", "stain")
+    return Rows(
+        v, girth, *(aged[name] for name in names), depth=aged["depth_m"], lichen=aged["lichen"]
+    )
+
+
 class Dress(NamedTuple):
     """What a preset's textures look like, made once for all pictures."""
 
@@ -112,30 +138,6 @@ class Dress(NamedTuple):
         ]
         pairs = [(one[0], one[-1]) for one in made]
         return cls(preset, pairs[0], pairs[1], _ranked(seed))
-
-    def relief(self, rows: Rows, *, generation: int = 0, seed: int = 0) -> Relief:
-        """Give the relief of fractures for the rows of a picture."""
-        carving = self.preset.carving
-        aged = self.preset.aged(rows.girth)
-        return Relief(
-            depth=aged["depth_m"] * carving.again_depth**generation,
-            per_width=aged["per_width"],
-            shoulder=aged["shoulder"],
-            reach=np.full(len(rows.v), carving.reach_m),
-            fray=aged["fray_m"],
-            profile=profile_of(carving.profile),
-            opening=OPENINGS.index(carving.opening),
-            fray_length=carving.fray_length_m,
-            seed=seed + generation,
-        )
-
-    def rows(self, v: NDArray[np.float64], girth: NDArray[np.float64]) -> Rows:
-        """Give what changes from row to row; `girth` is that of the stem it stands for."""
-        aged = self.preset.aged(girth)
-        names = ("old_skin", "old_inside", "grime", "stain")
-        return Rows(
-            v, girth, *(aged[name] for name in names), depth=aged["depth_m"], lichen=aged["lichen"]
-        )
 
     def surfaces(self, outlines: Silhouettes) -> Surfaces:
         """Lay out the textures: whole tiles around, and along where the bark continues."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from forest._threads import in_threads, thread_count
 from forest.errors import InputError, OutputError
-from forest.surface.bark.dressing import Dress, Fold
+from forest.surface.bark.dressing import Dress, Fold, relief_of, rows_at
 from forest.surface.bark.growing import Bark
 from forest.surface.bark.light import normals, occlusion
 from forest.surface.bark.outlines import rows_of, scratch
@@ -200,9 +200,8 @@ def _paint(
     v = rows_of(outlines.length, shape[0], outlines.low)
     girth = outlines.at(outlines.girth, v)
     aged = girth if girth_m is None else np.full(len(v), float(girth_m))
-    look = dress.rows(v, aged)
-    relief = dress.relief(look, generation=bark.generation, seed=seed)
-    rows = look._replace(girth=girth)
+    relief = relief_of(dress.preset, aged, generation=bark.generation, seed=seed)
+    rows = rows_at(dress.preset, v, aged)._replace(girth=girth)
     canvas = Canvas(
         np.empty((*shape, 3), np.uint8),
         np.empty(shape, np.float32),
@@ -210,7 +209,7 @@ def _paint(
     )
     in_threads(
         paint_all, outlines, relief, rows, dress.surfaces(outlines), dress.extras(outlines, folds),
-        under, work_for(outlines, scratch(outlines), shape[1]), canvas,
+        under, work_for(scratch(outlines), shape[1]), canvas,
     )  # fmt: skip
     return canvas, outlines
 

@@ -55,6 +55,7 @@ class _Room(NamedTuple):
 
     line: NDArray[np.float64]  # (chunks, pieces, 8)
     v: NDArray[np.float64]  # (rows,)
+    offset: NDArray[np.float64]  # (rows,)
 
 
 def profile_of(points: tuple[tuple[float, float], ...]) -> NDArray[np.float64]:
@@ -89,7 +90,19 @@ def fields(outlines: Silhouettes, relief: Relief, v: NDArray[np.float64], column
     shape = (len(v), columns)
     single = (np.empty(shape, np.float32) for _ in range(4))
     out = Fields(*single, np.empty(shape, np.int32))
-    in_threads(_fill, outlines, relief, _Room(scratch(outlines), v), out)
+    in_threads(_fill, outlines, relief, _Room(scratch(outlines), v, np.zeros(len(v))), out)
+    return out
+
+
+def fields_at(
+    outlines: Silhouettes, relief: Relief, turn: NDArray[np.float64], v: NDArray[np.float64]
+) -> Fields:
+    """Evaluate single points: turns and heights (n,), the relief of each; fields are (n, 1)."""
+    shape = (len(v), 1)
+    single = (np.empty(shape, np.float32) for _ in range(4))
+    out = Fields(*single, np.empty(shape, np.int32))
+    # A row of one column has its point at half a turn.
+    in_threads(_fill, outlines, relief, _Room(scratch(outlines), v, 0.5 - turn), out)
     return out
 
 
@@ -104,8 +117,8 @@ def _fill(first: Any, step: Any, outlines: Any, relief: Any, room: Any, out: Any
     for chunk in range(first, CHUNKS, step):
         for row in range(chunk, len(room.v), CHUNKS):
             outline_row(
-                outlines, relief, row, room.v[row], room.line[chunk], out.depth[row],
-                out.inside[row], out.epidermis[row], out.across[row], out.fracture[row],
+                outlines, relief, row, room.v[row], room.offset[row], room.line[chunk],
+                out.depth[row], out.inside[row], out.epidermis[row], out.across[row], out.fracture[row],
             )  # fmt: skip
 
 
@@ -141,7 +154,7 @@ def _wave(relief: Any, fracture: Any, side: Any, v: Any, spacing: Any, periods: 
 
 
 @njit
-def _gather(outlines: Any, relief: Any, row: Any, v: Any, line: Any) -> Any:
+def _gather(outlines: Any, relief: Any, row: Any, v: Any, offset: Any, line: Any) -> Any:
     """Evaluate the pieces that cross a row, in order of their left borders; count them.
 
     Columns: left and right border (turns), half-width (m), cosines of the borders' slants, turn on
@@ -163,7 +176,7 @@ def _gather(outlines: Any, relief: Any, row: Any, v: Any, line: Any) -> Any:
             continue
         torn = outlines.epidermis[i, 0] + s * (outlines.epidermis[i, 1] - outlines.epidermis[i, 0])
         fracture = outlines.fracture[i]
-        left, right = centre - half, centre + half
+        left, right = centre + offset - half, centre + offset + half
         if relief.fray[row] > 0.0:
             most = min(relief.fray[row] / girth, 0.8 * half)
             at = v - outlines.low
@@ -193,19 +206,19 @@ def _gather(outlines: Any, relief: Any, row: Any, v: Any, line: Any) -> Any:
 
 @njit
 def outline_row(
-    outlines: Any, relief: Any, row: Any, v: Any, line: Any,
+    outlines: Any, relief: Any, row: Any, v: Any, offset: Any, line: Any,
     depth: Any, inside: Any, epidermis: Any, across: Any, fracture: Any,
 ) -> None:  # fmt: skip
-    """Fill one row of the fields."""
+    """Fill one row of the fields; the bark is turned by `offset` turns first."""
     n = len(depth)
-    count, girth, shift = _gather(outlines, relief, row, v, line)
+    count, girth, shift = _gather(outlines, relief, row, v, offset, line)
     if count == 0:
         for x in range(n):
             depth[x] = 0.0
             inside[x] = 0.0
             across[x] = 0.0
             fracture[x] = -1
-            epidermis[x] = (x + 0.5) / n + shift
+            epidermis[x] = (x + 0.5) / n + shift - offset
         return
     for x in range(n):
         fracture[x] = -1

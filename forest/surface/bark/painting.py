@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import driver, njit
-from forest.surface.bark.outlines import CHUNKS, Relief, outline_row
-from forest.surface.bark.silhouettes import Silhouettes
+from forest.surface.bark.outlines import CHUNKS, outline_row
 
 _TURN = 2.0 * np.pi
 _HEIGHT = 3
@@ -87,7 +86,7 @@ def paint_all(
         part = work.rows[chunk]
         for row in range(chunk, len(rows.v), CHUNKS):
             outline_row(
-                outlines, relief, row, rows.v[row], work.line[chunk],
+                outlines, relief, row, rows.v[row], 0.0, work.line[chunk],
                 part[0], part[1], part[2], part[3], work.fracture[chunk],
             )  # fmt: skip
             _paint_row(
@@ -221,7 +220,7 @@ def _paint_row(
         canvas.roughness[row, x] = np.uint8(255.0 * min(1.0, max(0.0, rough)) + 0.5)
 
 
-def work_for(outlines: Silhouettes, line: NDArray[np.float64], columns: int) -> Work:
+def work_for(line: NDArray[np.float64], columns: int) -> Work:
     """Make the working space."""
     return Work(
         line,
@@ -229,12 +228,3 @@ def work_for(outlines: Silhouettes, line: NDArray[np.float64], columns: int) -> 
         np.empty((CHUNKS, columns), np.int32),
         np.empty((CHUNKS, 2, 5)),
     )
-
-
-def relief_like(relief: Relief, rows: int) -> Relief:
-    """Repeat a relief of one row for all rows."""
-    columns = {
-        name: np.repeat(getattr(relief, name), rows)
-        for name in ("depth", "per_width", "shoulder", "reach", "fray")
-    }
-    return relief._replace(**columns)

@@ -58,6 +58,10 @@ class Tearing(Table):
     attachment: float = quantity(0.0, "grip of the wood on the bark, K_a", unit="N/m3", ge=0)
     inglis: float = quantity(6.0, "length over width beyond which fractures run on", gt=0, le=1000)
     arrest: float = quantity(0.6, "load that stops them, share of what breaks bark", ge=0, le=2)
+    run_m: float = quantity(
+        0.02, "how far an end runs on in a fourteenth of the growth: short, and it tapers",
+        unit="m", gt=0, le=100,
+    )  # fmt: skip
     influence: float = quantity(3.0, "reach of a fracture on the course of others", ge=0, le=50)
     stand_off: float = quantity(0.5, "how near they come, in widths", ge=0, le=50)
     stray_deg: float = quantity(15.0, "how much their course strays", unit="degree", ge=0, le=80)
@@ -186,6 +190,7 @@ class Preset(Table):
             flaw_m=tearing.flaw_m,
             inglis=tearing.inglis,
             arrest=tearing.arrest,
+            run_m=tearing.run_m,
             influence=tearing.influence,
             stand_off=tearing.stand_off,
             stray_deg=tearing.stray_deg,

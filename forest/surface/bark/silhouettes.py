@@ -2,7 +2,8 @@
 
 A fracture's left and right border are cubic curves along the axis through the edges of its
 elements; it ends in a point in the middle of the first strip that it did not tear. With borders
-that run straight there, the area torn open is the same as on the strips. Between fractures lies
+that run straight there, the area torn open is the same as on the strips. Two fractures that met
+head on in neighbouring strips are one opening. Between fractures lies
 epidermis, whose own coordinate runs on across each of them: none is lost, none is made.
 
 Around the axis everything is in turns from the seam, along it in metres. Where fractures join,
@@ -20,6 +21,9 @@ from forest._jit import njit
 from forest.errors import InputError
 from forest.surface.bark.growing import Bark
 from forest.surface.bark.strips import FRACTURE
+
+#: Ends face each other when their middles lie within so many of their mean widths.
+_HEAD_ON = 1.5
 
 _Floats = NDArray[np.float64]
 _Indices = NDArray[np.int64]
@@ -212,6 +216,7 @@ def _pieces(nodes: _Nodes, ring: _Ring, knots: _Floats, cyclic: bool) -> _Pieces
     n = len(knots) - 2
     upward = _neighbouring(nodes, nodes.up, 1, n, cyclic)
     downward = _neighbouring(nodes, nodes.down, -1, n, cyclic)
+    _join_heads(nodes, upward, downward, n, cyclic)
     slope, swell = _slopes(nodes, upward, downward, knots)
     parts = [_between(nodes, slope, swell, knots, *_pairs(nodes, upward, downward))]
     met_above = np.zeros(len(nodes.strip), np.bool_)
@@ -239,6 +244,30 @@ def _neighbouring(nodes: _Nodes, link: _Indices, step: int, n: int, cyclic: bool
         wanted %= n
     fits = (link >= 0) & (nodes.strip[link] == wanted)
     return np.where(fits, link, -1)
+
+
+def _join_heads(
+    nodes: _Nodes, upward: _Indices, downward: _Indices, n: int, cyclic: bool
+) -> None:
+    """Link upper ends to lower ends that face them from the strip above, each to the nearest."""
+    tops, bottoms = np.flatnonzero(upward < 0), np.flatnonzero(downward < 0)
+    facing = nodes.strip[tops] + 1
+    if cyclic:
+        facing %= n
+    strip_of = nodes.strip[bottoms]
+    order = np.argsort(strip_of, kind="stable")
+    low, high = (np.searchsorted(strip_of[order], facing, side=end) for end in ("left", "right"))
+    counts = (high - low).astype(np.int64)
+    i = np.repeat(tops, counts)
+    j = bottoms[order[np.repeat(low, counts) + _counting(counts)]]
+    apart = np.abs(_turned(nodes.centre[j] - nodes.centre[i]))
+    near = (apart <= _HEAD_ON * (nodes.half[i] + nodes.half[j])) & (i != j)
+    i, j, apart = i[near], j[near], apart[near]
+    taken = np.argsort(apart, kind="stable")
+    for k in taken:
+        if upward[i[k]] < 0 and downward[j[k]] < 0:
+            upward[i[k]] = j[k]
+            downward[j[k]] = i[k]
 
 
 def _pairs(nodes: _Nodes, upward: _Indices, downward: _Indices) -> tuple[_Indices, _Indices]:
