@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forest.cli.shared import check_targets, last_shapes
+from forest.cli.shared import check_targets
 
 if TYPE_CHECKING:
+    from forest.scenario import Scenario
+    from forest.trees.skeleton import Skeleton
     from forest.view.scenery import Scenery
 
 
@@ -102,21 +104,43 @@ def _of_file(scene: Path) -> Scenery:
 
 
 def _of_run(path: Path, year: int | None, tile: int) -> Scenery:
-    """Read a year of a run; if its checkpoint is of that year, every tree has its own shape."""
-    from forest.record.checkpoint import checkpoint_paths
+    """Read a year of a run, with the shapes of the checkpoint that is nearest to it."""
+    from dataclasses import replace
+
     from forest.record.run import open_run
     from forest.view.scenery import scenery_of_run
 
     with open_run(path) as run:
-        shapes: list[Any] = []
-        if len(run.years):
-            wanted = int(run.years[-1]) if year is None else year
-            name = f".checkpoint-{wanted - run.scenario.start_year + 1:06d}.npz"
-            kept = checkpoint_paths(path)
-            if kept and kept[-1].name.endswith(name):
-                at, found = last_shapes(path, run.scenario)
-                shapes = [s for s in found if s.tree_id > 0] if at == wanted else []
-        return scenery_of_run(run, year, shapes=shapes, tile=tile)
+        if not len(run.years):
+            return scenery_of_run(run, year, tile=tile)
+        wanted = int(run.years[-1]) if year is None else year
+        at, shapes, notes = _nearest_shapes(path, run.scenario, wanted)
+        scenery = scenery_of_run(run, year, shapes=shapes, shapes_year=at, tile=tile)
+        return replace(scenery, notes=scenery.notes + notes)
+
+
+def _nearest_shapes(
+    run_file: Path, scenario: Scenario, year: int
+) -> tuple[int, list[Skeleton], tuple[str, ...]]:
+    """Take all trees' shapes from the whole checkpoint nearest to a year: year, shapes, notes."""
+    from forest.errors import InputError
+    from forest.record.checkpoint import checkpoint_paths, read_checkpoint, step_of
+    from forest.stand import Stand
+
+    def years_off(path: Path) -> int:
+        return abs(scenario.start_year + step_of(path) - 1 - year)
+
+    notes: list[str] = []
+    for path in sorted(checkpoint_paths(run_file), key=years_off):
+        try:
+            arrays, meta = read_checkpoint(path)
+        except InputError as error:
+            notes.append(f"{error}: its shapes are not used")
+            continue
+        stand = Stand.restore(scenario, arrays, meta)
+        shapes = [stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id]
+        return stand.year, shapes, tuple(notes)
+    return year, [], tuple(notes)
 
 
 def _changed(
@@ -145,10 +169,13 @@ def _changed(
             raise InputError(f"--haze is {haze:g}", expected="metres above 0")
         changes["haze"] = replace(scenery.haze, visibility_m=haze)
     if size is not None:
-        width, height = _numbers(size.lower().replace("x", ","), "--size", 2)
-        if not all(side == int(side) and 16 <= side <= 16384 for side in (width, height)):
-            raise InputError(f"--size is {size!r}", expected="WxH, 16 to 16384 pixels each")
-        changes["size"] = (int(width), int(height))
+        sides = size.lower().split("x")
+        whole = len(sides) == 2 and all(side.isascii() and side.isdigit() for side in sides)
+        if not whole or not all(16 <= int(side[:9]) <= 16384 for side in sides):
+            raise InputError(
+                f"--size is {size!r}", expected="WxH, 16 to 16384 pixels each, e.g. 1200x750"
+            )
+        changes["size"] = (int(sides[0]), int(sides[1]))
     return replace(scenery, **changes)
 
 
@@ -163,7 +190,8 @@ def _seen_from(
     changes: dict[str, Any] = {}
     for name, text in (("eye", eye), ("towards", towards)):
         if text is not None:
-            changes[name] = _numbers(text, f"--{name}", 3)
+            x, y, above = _numbers(text, f"--{name}", 3)
+            changes[name] = (x - scenery.origin_m[0], y - scenery.origin_m[1], above)
     if field_of_view is not None:
         if not 0.0 < field_of_view < 170.0:
             raise InputError(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.errors import OutputError
+from forest.errors import InputError, OutputError
 
 _KEPT = 2
 _META = "meta_json"
@@ -85,14 +85,38 @@ def latest_checkpoint(run_path: str | Path) -> tuple[Arrays, dict[str, Any]] | N
     """
     for path in reversed(checkpoint_paths(run_path)):
         try:
-            _verify(path)
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            meta = json.loads(arrays.pop(_META).tobytes())
-        except _BROKEN:
+            return read_checkpoint(path)
+        except InputError:
             continue
-        return arrays, meta
     return None
+
+
+def read_checkpoint(path: Path) -> tuple[Arrays, dict[str, Any]]:
+    """Read one checkpoint.
+
+    Returns
+    -------
+    arrays : dict of str to array
+    meta : dict
+
+    Raises
+    ------
+    InputError
+        If it is not whole.
+    """
+    try:
+        _verify(path)
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        meta = json.loads(arrays.pop(_META).tobytes())
+    except _BROKEN:
+        raise InputError("is broken", where=path.name) from None
+    return arrays, meta
+
+
+def step_of(path: Path) -> int:
+    """Give the whole years done, which a checkpoint's name ends in."""
+    return int(path.stem[-6:])
 
 
 def remove_checkpoints(run_path: str | Path) -> None:

@@ -29,6 +29,8 @@ LEAF_ITEM = LAST_LEVEL + 1
 #: Sides of the tubes of each level of stems; small branches are triangular (Oppenheimer 1986).
 SIDES = (12, 6, 3)
 
+_PER_LOBE = 4  # sides of a lobed stem for each lobe: peak, hollow and the two flanks
+
 _Array = NDArray[np.float64]
 
 
@@ -89,11 +91,22 @@ class Description:
         In order of creation.
     lobes : (int, float)
         Number of peaks around the trunk, and their height as a share of its radius.
+    lobed_levels : int
+        Levels of stems that have them; the trunk's alone, but of a cactus all.
     """
 
     stems: tuple[Segments, ...]
     leaves: Leaves
     lobes: tuple[int, float] = (0, 0.0)
+    lobed_levels: int = 1
+
+    def sides(self, level: int) -> int:
+        """Count the sides of the tubes of a level of stems; lobes need some for each."""
+        count, depth = self._lobes_of(level)
+        return max(SIDES[level], _PER_LOBE * count) if depth else SIDES[level]
+
+    def _lobes_of(self, level: int) -> tuple[int, float]:
+        return self.lobes if level < self.lobed_levels else (0, 0.0)
 
     def drawn(self, shares: Fractions) -> Drawing:
         """Give what the paper's loop draws.
@@ -107,10 +120,9 @@ class Description:
         for level, stems in enumerate(self.stems):
             total = len(stems.internode)
             tubes = drawn(total, float(shares.stem_polygons[level]), STEM_MASS)
-            corners = _tubes(stems, tubes, SIDES[level], self.lobes if level == 0 else (0, 0.0))
-            triangles.append(
-                _primitives(corners, level, stems.internode[tubes].repeat(2 * SIDES[level]))
-            )
+            sides = self.sides(level)
+            corners = _tubes(stems, tubes, sides, self._lobes_of(level))
+            triangles.append(_primitives(corners, level, stems.internode[tubes].repeat(2 * sides)))
             threads = drawn(total, float(shares.stem_lines[level]), STEM_MASS)
             lines.append(_primitives(stems.centre[threads], level, stems.internode[threads]))
         total = len(self.leaves.shape)
@@ -128,7 +140,11 @@ class Description:
 
 
 def describe(
-    skeleton: Skeleton, leaves: Leaves, *, lobes: tuple[int, float] = (0, 0.0)
+    skeleton: Skeleton,
+    leaves: Leaves,
+    *,
+    lobes: tuple[int, float] = (0, 0.0),
+    lobed_levels: int = 1,
 ) -> Description:
     """Sort a tree into the paper's four lists.
 
@@ -141,6 +157,8 @@ def describe(
         `forest.trees.leaves.leaves_of` makes those of a simulated tree.
     lobes : (int, float)
         Lobes and LobeDepth of a parametric tree's trunk (section 4.4).
+    lobed_levels : int
+        Levels of stems that have them.
     """
     heading, side = carry_frames(skeleton)
     across = np.cross(heading, side)
@@ -160,7 +178,7 @@ def describe(
     stems = tuple(
         Segments(*(field[by_axis[level == k]] for field in whole)) for k in range(LAST_LEVEL + 1)
     )
-    return Description(stems, leaves, lobes)
+    return Description(stems, leaves, lobes, lobed_levels)
 
 
 def _tubes(

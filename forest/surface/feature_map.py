@@ -9,15 +9,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from forest._jit import njit
 from forest.dynamics.draws import uniforms_of
 from forest.errors import InputError
 from forest.random import STREAM_SCENERY
-from forest.scenario.placing import MOST_TREES, Spots
+from forest.scenario.placing import MOST_TREES
 from forest.species.text import input_error
 from forest.surface.terrain import read_array, read_grey
 
@@ -180,7 +181,7 @@ def spread(features: FeatureMap, kinds: Sequence[Spreading], seed: int) -> Sprea
     Returns
     -------
     Spread
-        Where the least distance leaves no room, fewer trees than `per_ha` asks for.
+        Where the least distance leaves no room, fewer trees than `asked_for`.
 
     Raises
     ------
@@ -199,10 +200,15 @@ def spread(features: FeatureMap, kinds: Sequence[Spreading], seed: int) -> Sprea
     return Spread(*(np.concatenate(column) for column in zip(none, *parts, strict=True)))
 
 
+def asked_for(features: FeatureMap, kind: Spreading) -> int:
+    """Count the trees that `per_ha` asks for, whether there is room for them or not."""
+    cells = np.count_nonzero(features.bears(kind.bit))
+    return round(kind.per_ha * int(cells) * features.cell_m**2 / 1e4)
+
+
 def _spread_one(features: FeatureMap, kind: Spreading, number: int, seed: int) -> Spread:
     row, column = np.nonzero(features.bears(kind.bit))
-    area = len(row) * features.cell_m**2
-    count = round(kind.per_ha * area / 1e4)
+    count = asked_for(features, kind)
     if count > MOST_TREES:
         raise InputError(f"{count} trees of bit {kind.bit}", expected=f"at most {MOST_TREES}")
     ids = np.arange(count, dtype=np.int32)
@@ -233,33 +239,63 @@ def _place(
     row, column = cells
     x, y = places
     rows = features.bits.shape[0]
-    spots = None
-    if kind.least_distance_m > 0.0:
-        spots = Spots(features.size_m, kind.least_distance_m, periodic=False)
+    room = _Room.of(features.size_m, kind.least_distance_m, len(x))
     waiting = np.arange(len(x), dtype=np.int32)
-    for attempt in range(_TRIES if spots else 1):
+    for attempt in range(_TRIES if kind.least_distance_m > 0.0 else 1):
         draws = uniforms_of(
             seed, STREAM_SCENERY, waiting, kind.bit, number * (_TRIES + 1) + 1 + attempt
         )
         cell = np.minimum((draws[:, 0] * len(row)).astype(np.int64), len(row) - 1)
         east = (column[cell] + draws[:, 1]) * features.cell_m
         north = (rows - 1 - row[cell] + draws[:, 2]) * features.cell_m
-        if spots is None:
-            settled = np.ones(len(waiting), np.bool_)
-        else:
-            settled = _settle(spots, waiting, east, north)
+        settled = np.ones(len(waiting), np.bool_)
+        if kind.least_distance_m > 0.0:
+            _settle(room, waiting, east, north, settled)
         x[waiting[settled]] = features.origin[0] + east[settled]
         y[waiting[settled]] = features.origin[1] + north[settled]
         waiting = waiting[~settled]
 
 
-def _settle(
-    spots: Spots, trees: NDArray[np.int32], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+class _Room(NamedTuple):
+    """The spots taken so far, in lists of the cells of a grid, none narrower than the distance."""
+
+    distance: float
+    size: NDArray[np.float64]  # width and depth of the whole
+    first: NDArray[np.int32]  # (nx, ny) tree of each cell's list, -1 for none
+    then: NDArray[np.int32]  # (n,) the next in the list of a tree's cell
+    spot: NDArray[np.float64]  # (n, 2)
+
+    @classmethod
+    def of(cls, size_m: tuple[float, float], distance_m: float, trees: int) -> _Room:
+        """Make a grid of no more than about four cells a tree."""
+        side = max(distance_m, float(np.sqrt(size_m[0] * size_m[1] / (4.0 * trees + 4.0))))
+        cells = [max(int(edge / side), 1) for edge in size_m]
+        return cls(
+            distance_m,
+            np.array(size_m),
+            np.full(cells, -1, np.int32),
+            np.full(trees, -1, np.int32),
+            np.empty((trees, 2)),
+        )
+
+
+@njit
+def _settle(room: Any, trees: Any, x: Any, y: Any, free: Any) -> None:
     """Take the spots that are free, one tree after the other; tell which were."""
-    free = np.zeros(len(trees), np.bool_)
-    for k, tree in enumerate(trees):
-        if spots.neighbour(float(x[k]), float(y[k])) is None:
-            spots.take(float(x[k]), float(y[k]), int(tree))
-            free[k] = True
-    return free
+    nx, ny = room.first.shape
+    for k in range(len(trees)):
+        cx = min(int(x[k] / room.size[0] * nx), nx - 1)
+        cy = min(int(y[k] / room.size[1] * ny), ny - 1)
+        free[k] = True
+        for i in range(max(cx - 1, 0), min(cx + 2, nx)):
+            for j in range(max(cy - 1, 0), min(cy + 2, ny)):
+                other = room.first[i, j]
+                while other >= 0 and free[k]:
+                    dx, dy = x[k] - room.spot[other, 0], y[k] - room.spot[other, 1]
+                    free[k] = np.sqrt(dx * dx + dy * dy) >= room.distance
+                    other = room.then[other]
+        if free[k]:
+            tree = trees[k]
+            room.spot[tree, 0], room.spot[tree, 1] = x[k], y[k]
+            room.then[tree] = room.first[cx, cy]
+            room.first[cx, cy] = tree

@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 
 from forest._jit import driver, njit
 from forest._threads import in_threads
+from forest.surface.detail import LAST_LEVEL
 from forest.surface.instances import Elements
 from forest.surface.shadow import ShadowMap, shaded_by_others
 
 #: Steps of sunlight of `Look.table`.
 SHADES = 256
+
+#: A stem's shade is the mean over so many points, up to so far from its middle along it, m.
+STEM_POINTS, STEM_REACH_M = 5, 1.0
 
 _JOB = 200_000  # primitives of a job; fixed, so that nothing depends on the number of threads
 
@@ -32,11 +36,30 @@ class Light(NamedTuple):
 
 
 class Look(NamedTuple):
-    """How a list's elements look: whether leaves, the colour by sunlight, own shadow's marks."""
+    """How a list's elements look.
+
+    Attributes
+    ----------
+    leaf, long : bool
+        Whether they are leaves, and whether stems so long that their shade is a mean.
+    table : float64 (t, SHADES, 3)
+        Colours by tone and sunlight.
+    tone : uint8 (e,)
+        Each element's.
+    shaded : float32 (e,)
+        What the tree itself takes of its sun, 0 to 1.
+    """
 
     leaf: bool
+    long: bool
     table: NDArray[np.float64]
-    shaded: NDArray[np.bool_]
+    tone: NDArray[np.uint8]
+    shaded: NDArray[np.float32]
+
+
+def is_long(item: int) -> bool:
+    """Whether the shade of a list's elements is a mean along them: trunk and main branches."""
+    return item < LAST_LEVEL
 
 
 class Trees(NamedTuple):
@@ -66,6 +89,7 @@ class _Arrays(NamedTuple):
 
     vertices: NDArray[np.float32]
     facing: NDArray[np.float32]
+    along: NDArray[np.float32]
     first: NDArray[np.int32]
     middle: NDArray[np.float32]
     width_m: NDArray[np.float32]
@@ -116,7 +140,9 @@ def fill(
     def work(first: int, step: int) -> None:
         for job in jobs[first::step]:
             part, k = job.part, job.part.corners
-            arrays = _Arrays(part.vertices, part.facing, part.first, part.middle, part.width_m)
+            arrays = _Arrays(
+                part.vertices, part.facing, part.along, part.first, part.middle, part.width_m
+            )
             out = Out(vertices[k], colour[k], width[k])
             _fill(arrays, np.int64(part.mass), job.look, job.trees, light, out)
 
@@ -178,26 +204,36 @@ def _fill(part: Any, mass: Any, look: Any, trees: Any, light: Any, out: Any) -> 
         for m in range((total + mass - 1) // mass):
             start = m * mass
             for e in range(start, min(start + whole + (m < more), total)):
-                dark = look.shaded[e] or (light.has_map and _others_shade(part, trees, light, j, e))
+                sun = 1.0 - look.shaded[e]
+                if light.has_map and sun > 0.0:
+                    sun *= 1.0 - _others_shade(part, look, trees, light, j, e)
                 for p in range(part.first[e], part.first[e + 1]):
                     _place(part, trees, j, p, out, at)
-                    _paint(part, look, trees, light, dark, j, p, out, at)
+                    _paint(part, look, trees, light, sun, look.tone[e], j, p, out, at)
                     if len(out.width):
                         out.width[at] = part.width_m[e] * trees.pixels[j]
                     at += 1
 
 
 @driver
-def _others_shade(part: Any, trees: Any, light: Any, j: Any, e: Any) -> Any:
-    """Tell whether an element of tree `j` lies in another tree's shade."""
+def _others_shade(part: Any, look: Any, trees: Any, light: Any, j: Any, e: Any) -> Any:
+    """Give the share of an element of tree `j` that lies in other trees' shade."""
     scale = trees.scale[j]
-    return shaded_by_others(
-        light.map,
-        trees.row[j],
-        trees.place[j, 0] + scale * part.middle[e, 0],
-        trees.place[j, 1] + scale * part.middle[e, 1],
-        trees.place[j, 2] + scale * part.middle[e, 2],
-    )
+    x = trees.place[j, 0] + scale * part.middle[e, 0]
+    y = trees.place[j, 1] + scale * part.middle[e, 1]
+    z = trees.place[j, 2] + scale * part.middle[e, 2]
+    points = STEM_POINTS if look.long else 1
+    dark = 0
+    for k in range(points):
+        way = STEM_REACH_M * (2 * k - points + 1) / max(points - 1, 1)
+        dark += shaded_by_others(
+            light.map,
+            trees.row[j],
+            x + way * part.along[e, 0],
+            y + way * part.along[e, 1],
+            z + way * part.along[e, 2],
+        )
+    return dark / points
 
 
 @driver
@@ -213,13 +249,22 @@ def _place(part: Any, trees: Any, j: Any, p: Any, out: Any, at: Any) -> None:
 
 @driver
 def _paint(
-    part: Any, look: Any, trees: Any, light: Any, dark: Any, j: Any, p: Any, out: Any, at: Any
+    part: Any,
+    look: Any,
+    trees: Any,
+    light: Any,
+    sun: Any,
+    tone: Any,
+    j: Any,
+    p: Any,
+    out: Any,
+    at: Any,
 ) -> None:
-    """Colour a primitive: by the sun unless it is in the dark, then by the haze."""
+    """Colour a primitive: by its share of the sun, then by the haze."""
     shade = 0
-    if not dark:
-        shade = int(_sunlight(part, light.sun, p, look.leaf) * (SHADES - 1) + 0.5)
+    if sun > 0.0:
+        shade = int(sun * _sunlight(part, light.sun, p, look.leaf) * (SHADES - 1) + 0.5)
     clear = trees.clear[j]
     for c in range(3):
-        colour = clear * look.table[shade, c] + (1.0 - clear) * 255.0 * light.haze_colour[c]
+        colour = clear * look.table[tone, shade, c] + (1.0 - clear) * 255.0 * light.haze_colour[c]
         out.colour[at, c] = np.uint8(colour + 0.5)

@@ -17,12 +17,15 @@ from forest.surface.camera import Camera
 from forest.surface.description import LEAF_ITEM
 from forest.surface.detail import Sight, fractions
 from forest.surface.directions import along, unit
-from forest.surface.filling import SHADES, Job, Light, Look, Trees, count, cut, fill
+from forest.surface.filling import SHADES, Job, Light, Look, Trees, count, cut, fill, is_long
 from forest.surface.instances import Colour, Elements, Instances, Model
-from forest.surface.light import haze_share, sunlit
+from forest.surface.light import bark_step, bark_steps, haze_share, sunlit
 from forest.surface.shadow import NO_MAP, ModelShadow, SceneShadow
 
 __all__ = ["Camera", "Frame", "haze_share", "prepare", "sunlit"]
+
+#: Primitives of a frame at most: 4 GB of triangles, or 2 GB of points.
+MOST_PRIMITIVES = 100_000_000
 
 _LEAST_RANGE_M = 0.1
 
@@ -103,7 +106,8 @@ def prepare(
     Raises
     ------
     InputError
-        If season, quality, sun or haze are out of range, or the shadows another scene's.
+        If season, quality, sun or haze are out of range, the shadows another scene's, or there are
+        more than `MOST_PRIMITIVES` to draw.
 
     Notes
     -----
@@ -127,6 +131,7 @@ def prepare(
             look = _look(model, part, season, None if shadows is None else shadows.own[k])
             trees = _drawn(part, of_model, part.share(shares), totals)
             jobs += [Job(part, look, *piece) for piece in cut(trees)]
+    _check_room(totals, len(views.row))
     vertices, colour, width = fill(jobs, totals, light)
     return Frame(
         triangles=vertices[3].reshape(-1, 3, 3),
@@ -192,6 +197,16 @@ def _drawn(
     return Trees(views.row, views.place, views.scale, share, views.clear, pixels, start, number)
 
 
+def _check_room(totals: dict[int, int], trees: int) -> None:
+    """Refuse what memory may not hold, before it is asked for."""
+    number = sum(totals.values())
+    if number > MOST_PRIMITIVES:
+        raise InputError(
+            f"{number:,} triangles, lines and points of {trees:,} trees in view",
+            expected=f"at most {MOST_PRIMITIVES:,}: fewer trees or most_leaves, or a lower quality",
+        )
+
+
 def _check_shadows(
     shadows: SceneShadow, models: Sequence[Model], season: str, sun: NDArray[np.float64]
 ) -> None:
@@ -205,7 +220,11 @@ def _check_shadows(
 
 def _look(model: Model, part: Elements, season: str, own: ModelShadow | None) -> Look:
     leaf = part.item == LEAF_ITEM
-    colour = model.foliage[season] if leaf else model.bark
-    table = 255.0 * sunlit(np.asarray(colour), np.linspace(0.0, 1.0, SHADES))
-    shaded = np.zeros(len(part.first) - 1, np.bool_) if own is None else own.shaded[part.item]
-    return Look(leaf, table, shaded)
+    number = len(part.first) - 1
+    if leaf:
+        colours, tone = np.asarray(model.foliage[season])[None], np.zeros(number, np.uint8)
+    else:
+        colours, tone = bark_steps(model.bark), bark_step(part.width_m)
+    table = 255.0 * sunlit(colours[:, None], np.linspace(0.0, 1.0, SHADES))
+    shaded = np.zeros(number, np.float32) if own is None else own.shaded[part.item]
+    return Look(leaf, is_long(part.item), table, tone, shaded)

@@ -30,6 +30,15 @@ from forest.trees.skeleton import Skeleton
 
 Colour = tuple[float, float, float]
 
+#: Colours of a model that are not told otherwise: bark, and leaves by season.
+BARK: Colour = (0.42, 0.36, 0.30)
+FOLIAGE: Mapping[str, Colour] = {
+    "spring": (0.50, 0.63, 0.24),
+    "summer": (0.34, 0.50, 0.20),
+    "fall": (0.75, 0.52, 0.15),
+    "winter": (0.33, 0.45, 0.21),
+}
+
 
 class Elements(NamedTuple):
     """One of a tree's lists as one kind of primitive, as the kernels read it.
@@ -44,6 +53,8 @@ class Elements(NamedTuple):
         Corners of each primitive, m from the tree's foot; k is 3, 2 or 1.
     facing : float32 (p, 3)
         Unit normal of a triangle or of a point's leaf; direction of a line.
+    along : float32 (e, 3)
+        Unit vector along each internode; 0 of leaves.
     first : int32 (e + 1,)
         First primitive of each element.
     middle : float32 (e, 3)
@@ -56,6 +67,7 @@ class Elements(NamedTuple):
     mass: int
     vertices: NDArray[np.float32]
     facing: NDArray[np.float32]
+    along: NDArray[np.float32]
     first: NDArray[np.int32]
     middle: NDArray[np.float32]
     width_m: NDArray[np.float32]
@@ -116,15 +128,28 @@ class Model:
         leaves: Leaves,
         *,
         evergreen: bool,
-        bark: Colour,
-        foliage: Mapping[str, Colour],
+        bark: Colour = BARK,
+        foliage: Mapping[str, Colour] = FOLIAGE,
+        lobes: tuple[int, float] = (0, 0.0),
+        lobed_levels: int = 1,
     ) -> Model:
-        """Make the model of a tree, wherever it stands: its foot becomes the origin."""
+        """Make the model of a tree, wherever it stands: its foot becomes the origin.
+
+        Parameters
+        ----------
+        skeleton, leaves
+            The tree.
+        evergreen, bark, foliage
+            As of the class; brown bark and green leaves unless given.
+        lobes, lobed_levels
+            Of the stems' cross sections, as of `forest.surface.describe`.
+        """
         if len(skeleton):
             foot = skeleton.start[0]
             skeleton = replace(skeleton, start=skeleton.start - foot, end=skeleton.end - foot)
             leaves = leaves._replace(position=leaves.position - foot)
-        return cls(describe(skeleton, leaves), evergreen, bark, foliage)
+        whole = describe(skeleton, leaves, lobes=lobes, lobed_levels=lobed_levels)
+        return cls(whole, evergreen, bark, foliage)
 
     @cached_property
     def lists(self) -> tuple[Elements, ...]:
@@ -156,6 +181,7 @@ class Model:
             STEM_MASS,
             _flat(corners),
             _units(facing),
+            _units(stems.centre[:, 1] - stems.centre[:, 0]),
             (np.arange(total + 1) * (len(corners) // max(total, 1))).astype(np.int32),
             stems.centre.mean(axis=1).astype(np.float32),
             np.linalg.norm(stems.side, axis=2).sum(axis=1).astype(np.float32),
@@ -173,6 +199,7 @@ class Model:
             mass,
             _flat(primitives.vertices[here]),
             leaves.normal[element].astype(np.float32),
+            np.zeros((len(leaves.shape), 3), np.float32),
             np.searchsorted(element, np.arange(len(leaves.shape) + 1)).astype(np.int32),
             middle.astype(np.float32),
             np.sqrt(leaves.area).astype(np.float32),

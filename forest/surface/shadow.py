@@ -22,7 +22,7 @@ from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.errors import InputError, nearest
 from forest.surface.description import LEAF_ITEM
-from forest.surface.detail import SEASONS
+from forest.surface.detail import LAST_LEVEL, SEASONS
 from forest.surface.directions import unit
 from forest.surface.instances import Elements, Instances, Model
 
@@ -30,8 +30,9 @@ _OWN_CELLS = 512  # along the longer side of a model's own map
 _OWN_BIAS = 3.0  # cells by which an element must lie behind another
 _BANDS = 32  # of rows; fixed, so that nothing depends on the number of threads
 _MOST_CELLS = 60_000_000
-_SCENE_CELLS = 3000  # along the longer side of a scene's map
+_SCENE_CELLS = 4_000_000  # of a scene's map whose cell is not given
 _LEAST_CELL_M = 0.001
+_STEM_REACH_M = 1.0  # marks of stems are averaged so far along them
 _LEAST_SINE = 0.1  # of the angle between a stem and the sun
 _OTHERS_BIAS = 1.0  # cells by which an element must lie behind another tree
 
@@ -73,12 +74,13 @@ class ModelShadow(NamedTuple):
     ----------
     map : ShadowMap
         What the sun sees of it, from the model's foot.
-    shaded : tuple of bool (e,)
-        For each item, which of its elements lie behind others.
+    shaded : tuple of float32 (e,)
+        For each item, what others take of its elements' sun: 0 or 1 of leaves and small branches;
+        of trunk and main branches the mean over a metre both ways along them.
     """
 
     map: ShadowMap
-    shaded: tuple[NDArray[np.bool_], ...]
+    shaded: tuple[NDArray[np.float32], ...]
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,7 @@ def scene_shadow(
     *,
     season: str = "summer",
     own: tuple[ModelShadow, ...] | None = None,
+    finest_m: float = _LEAST_CELL_M,
 ) -> SceneShadow:
     """Cast the shade of all trees of a scene.
 
@@ -160,11 +163,13 @@ def scene_shadow(
     sun : array_like (3,)
         Direction towards the sun; above the horizon.
     cell_m : float, optional
-        Size of a cell of the scene's map, m; a 3000th of the scene unless given.
+        Size of a cell of the scene's map, m. Unless given the map has 4 million cells.
     season : str
         One of `forest.surface.detail.SEASONS`; bare trees cast the shade of their branches.
     own : tuple of ModelShadow, optional
         From `own_shadows` for the same models, sun and season; worked out unless given.
+    finest_m : float
+        Without `cell_m`, no cell is smaller, m.
 
     Raises
     ------
@@ -176,7 +181,10 @@ def scene_shadow(
     if own is None:
         own = own_shadows(models, direction, season=season)
     place = _project(instances.place, axes)
-    scene = _empty_map(axes, *_bounds(own, instances, place), cell_m)
+    lower, upper = _bounds(own, instances, place)
+    scene = _empty_map(
+        axes, lower, upper, _cell_of(upper - lower, finest_m) if cell_m is None else cell_m
+    )
     for k, shadow in enumerate(own):
         rows = np.flatnonzero(instances.model == k)
         if len(rows):
@@ -226,15 +234,35 @@ def _own_shadow(model: Model, axes: NDArray[np.float64], *, leafy: bool) -> Mode
     picture = _empty_map(axes, lower, upper, cell)
     for triangles in corners:
         _rasterise(triangles, picture.corner, picture.cell_m, picture.depth)
-    shaded: list[NDArray[np.bool_]] = []
+    shaded: list[NDArray[np.float32]] = []
     for part in lists:
         if part.corners < 3:  # lines of the stems, then points of the leaves: one of each element
             middle = _project(part.middle, axes)
             middle[:, 2] += _lift(part, axes[2]) + _OWN_BIAS * cell
-            marks = np.zeros(len(middle), np.bool_)
+            marks = np.zeros(len(middle), np.float32)
             _mark(middle, picture.corner, picture.cell_m, picture.depth, marks)
-            shaded.append(marks)
+            shaded.append(_along_stems(marks, part.vertices) if part.item < LAST_LEVEL else marks)
     return ModelShadow(picture, tuple(shaded))
+
+
+def _along_stems(marks: NDArray[np.float32], lines: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Average the marks of internodes, lines (e, 6), over a metre both ways along their axis."""
+    if not len(marks):
+        return marks
+    lower, upper = lines[:, :3].astype(np.float64), lines[:, 3:].astype(np.float64)
+    length = np.linalg.norm(upper - lower, axis=1)
+    end = np.cumsum(length)
+    axis = np.cumsum(np.append(0, np.any(lower[1:] != upper[:-1], axis=1)))
+    first = np.flatnonzero(np.diff(axis, prepend=-1))
+    begins = (end - length)[first][axis]
+    ends = np.append(end[first[1:] - 1], end[-1])[axis]
+    middle = end - 0.5 * length
+    low, high = np.maximum(middle - _STEM_REACH_M, begins), np.minimum(middle + _STEM_REACH_M, ends)
+    ways = np.append(0.0, end)
+    dark = np.append(0.0, np.cumsum(marks * length))
+    share = np.interp(high, ways, dark) - np.interp(low, ways, dark)
+    mean = np.where(high > low, share / np.where(high > low, high - low, 1.0), marks)
+    return np.asarray(np.clip(mean, 0.0, 1.0), np.float32)
 
 
 def _lift(part: Elements, sun: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -261,16 +289,21 @@ def _bounds(
     return lower.min(axis=0), upper.max(axis=0)
 
 
+def _cell_of(extent: NDArray[np.float64], finest_m: float) -> float:
+    """Give the cell with which a map of this extent, and three cells more, has `_SCENE_CELLS`."""
+    width, height = extent.tolist()
+    free, half = _SCENE_CELLS - 9.0, 1.5 * (width + height)
+    return max(float(half + np.sqrt(half**2 + free * width * height)) / free, finest_m)
+
+
 def _empty_map(
     axes: NDArray[np.float64],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
-    cell_m: float | None,
+    cell_m: float,
 ) -> ShadowMap:
     """Make a map in which nothing stands, one cell wider than asked on each side."""
     extent = upper - lower
-    if cell_m is None:
-        cell_m = max(float(extent.max()) / _SCENE_CELLS, _LEAST_CELL_M)
     if not cell_m > 0.0:
         raise InputError(f"cell_m is {cell_m}", expected="metres above 0")
     cols, rows = np.ceil(extent / cell_m) + 2
@@ -316,7 +349,7 @@ def _mark(points: Any, corner: Any, cell: Any, depth: Any, marks: Any) -> None:
         row = int(np.floor((points[i, 1] - corner[1]) / cell))
         col = int(np.floor((points[i, 0] - corner[0]) / cell))
         if 0 <= row < depth.shape[0] and 0 <= col < depth.shape[1]:
-            marks[i] = depth[row, col] > points[i, 2]
+            marks[i] = 1.0 if depth[row, col] > points[i, 2] else 0.0
 
 
 @driver

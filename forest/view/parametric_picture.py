@@ -25,6 +25,8 @@ from forest.view.tree_mesh import linear
 SEASONS = {"spring": 0.5, "summer": 0.0, "fall": 0.0, "winter": 0.0}
 
 _YOUNG = np.array([0.60, 0.72, 0.30])  # colour of leaves that have just unfolded
+#: What the leaves of evergreens, simulated or not, are mixed with in winter, and how much of it.
+WINTER_DULL, WINTER_SHARE = (0.30, 0.33, 0.22), 0.25
 
 _MOST_LEAVES = 800_000
 _SIDES = 6
@@ -75,7 +77,10 @@ def leaf_colour(parameters: Parameters, season: str) -> NDArray[np.float64]:
     """Colour of the leaves in a season of `SEASONS`, as shares of red, green and blue."""
     falls = season == "fall" and not parameters.evergreen
     colour = colour_of(parameters.fall_colour if falls else parameters.leaf_colour)
-    young = 0.0 if parameters.evergreen else SEASONS[season]
+    if parameters.evergreen:
+        dull = WINTER_SHARE if season == "winter" else 0.0
+        return np.asarray((1.0 - dull) * colour + dull * np.array(WINTER_DULL))
+    young = SEASONS[season]
     return np.asarray((1.0 - young) * colour + young * _YOUNG)
 
 

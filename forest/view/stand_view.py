@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.errors import InputError
 from forest.record.export import whole_file
 from forest.surface.camera import Camera
 from forest.surface.frame import Frame, prepare
@@ -19,8 +21,8 @@ from forest.view.landscape_ground import GRASS_TINT, ground, hazed, sky
 from forest.view.scene import OVERSAMPLING, import_pyvista, open_plotter, pixels
 from forest.view.scenery.scenery import Scenery
 
-_SHADOW_CELL_M = 0.25
-_MOST_SHADOW_CELLS = 4_000_000
+_SHADOW_CELL_M = 0.25  # finer edges of shadows would be harder than the sun's
+_CHUNK = 2_000_000  # primitives that VTK holds at a time
 _WIDEST_PX = 8  # lines and points are drawn up to this many fine pixels wide
 _NEAR_M, _FAR_M = 0.15, 12_000.0
 _BLADE_WIDTH_M = 0.006
@@ -43,11 +45,12 @@ class StandView:
         self.scenery = scenery
         self.shadows: SceneShadow | None = None
         if shadows and len(scenery.instances.model):
-            x, y = scenery.instances.place[:, :2].T
-            area = (np.ptp(x) + 50.0) * (np.ptp(y) + 50.0)
-            cell = max(_SHADOW_CELL_M, float(np.sqrt(area / _MOST_SHADOW_CELLS)))
             self.shadows = scene_shadow(
-                scenery.models, scenery.instances, scenery.sun, cell, season=scenery.season
+                scenery.models,
+                scenery.instances,
+                scenery.sun,
+                season=scenery.season,
+                finest_m=_SHADOW_CELL_M,
             )
 
     def frame(self, camera: Camera) -> Frame:
@@ -76,18 +79,24 @@ class StandView:
         Returns
         -------
         uint8 (height, width, 3)
+
+        Raises
+        ------
+        InputError
+            If there is more in view than `forest.surface.frame.MOST_PRIMITIVES`.
         """
         camera = camera or self.scenery.camera()
+        frame = self.frame(camera)
         plotter = open_plotter((camera.width, camera.height))
         _add_surface(plotter, *sky(self.scenery, camera))
         _add_surface(plotter, *ground(self.scenery, camera, self.shadows))
-        _add_trees(plotter, self.frame(camera))
         self._add_grass(plotter, camera)
         view = plotter.camera
         view.position, view.focal_point = tuple(camera.eye), tuple(camera.towards)
         view.up = (0.0, 0.0, 1.0) if _is_upright(camera) else (0.0, 1.0, 0.0)
         view.view_angle = camera.field_of_view_deg
         view.clipping_range = (_NEAR_M, _FAR_M)
+        _draw_trees(plotter, frame)
         return pixels(plotter)
 
     def _add_grass(self, plotter: Any, camera: Camera) -> None:
@@ -108,7 +117,7 @@ class StandView:
         colour = hazed(blades.colour.reshape(-1, 3) / 255.0, points, camera, scenery)
         distance = np.linalg.norm(blades.vertices[:, 0] - np.asarray(camera.eye), axis=1)
         width = _BLADE_WIDTH_M * _pixels_per_metre(camera) / np.maximum(distance, _NEAR_M)
-        for size, here in _by_size(width):
+        for size, here in _by_size(width, blades.vertices, 1):
             pv = import_pyvista()
             mesh = pv.PolyData()
             mesh.points = blades.vertices[here].reshape(-1, 3)
@@ -133,8 +142,7 @@ def draw_stand_view(
     scenery : Scenery
         From `forest.view.scenery`: `load_scenery` or `scenery_of_run`.
     to : path
-        A .png file; or, for several frames, the .gif film, or the .png name that gets their
-        numbers.
+        A .png file; or the .gif film of several frames, or the .png name that gets their numbers.
     shadows : bool
         Whether trees cast shadows.
     frames : int
@@ -148,10 +156,21 @@ def draw_stand_view(
     -------
     list of Path
         The files written.
+
+    Raises
+    ------
+    InputError
+        If the name ends in neither .png nor .gif, or there is too much in view.
     """
     from PIL import Image
 
     to = Path(to)
+    if to.suffix.lower() not in (".png", ".gif"):
+        raise InputError(
+            f"unknown format '{to.suffix}'",
+            where=str(to),
+            expected="a name that ends in .png or .gif",
+        )
     cameras = list(_around(scenery, frames))
     view = StandView(scenery, shadows=shadows)
     say(f"{len(scenery.instances.model)} trees of {len(scenery.models)} shapes")
@@ -220,26 +239,60 @@ def _add_surface(
     plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
 
 
-def _add_trees(plotter: Any, frame: Frame) -> None:
-    pv = import_pyvista()
-    n = len(frame.triangles)
-    if n:
-        faces = np.arange(3 * n).reshape(n, 3)
-        mesh = pv.PolyData.from_regular_faces(frame.triangles.reshape(-1, 3), faces)
-        mesh.cell_data["rgb"] = _grained(frame.triangle_colour, frame.triangles, _FACE_GRAIN)
-        plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
-    for size, here in _by_size(OVERSAMPLING * frame.line_width):
-        mesh = pv.PolyData()
-        mesh.points = frame.lines[here].reshape(-1, 3)
+def _draw_trees(plotter: Any, frame: Frame) -> None:
+    """Draw the trees, a chunk at a time over the picture so far: memory holds no more of them.
+
+    VTK keeps several copies of all that a renderer holds.
+    """
+    shown = list(plotter.actors)
+    window, renderer = plotter.render_window, plotter.renderer
+    for add, number in (
+        (_add_triangles, len(frame.triangles)),
+        (_add_lines, len(frame.lines)),
+        (_add_points, len(frame.points)),
+    ):
+        for start in range(0, number, _CHUNK):
+            add(plotter, frame, slice(start, start + _CHUNK))
+            window.Render()
+            renderer.SetPreserveColorBuffer(True)
+            renderer.SetPreserveDepthBuffer(True)
+            for name in [name for name in plotter.actors if name not in shown]:
+                plotter.remove_actor(name, reset_camera=False, render=False)
+
+
+def _add_triangles(plotter: Any, frame: Frame, part: slice) -> None:
+    corners = frame.triangles[part]
+    faces = np.arange(3 * len(corners)).reshape(-1, 3)
+    mesh = import_pyvista().PolyData.from_regular_faces(corners.reshape(-1, 3), faces)
+    mesh.cell_data["rgb"] = _grained(frame.triangle_colour[part], corners, _FACE_GRAIN)
+    _put(plotter, mesh)
+
+
+def _add_lines(plotter: Any, frame: Frame, part: slice) -> None:
+    for size, here in _by_size(OVERSAMPLING * frame.line_width[part], frame.lines[part], 1):
+        corners = frame.lines[part][here]
+        mesh = import_pyvista().PolyData()
+        mesh.points = corners.reshape(-1, 3)
         mesh.lines = _cells(len(here), 2)
-        mesh.cell_data["rgb"] = _grained(frame.line_colour[here], frame.lines[here])
-        plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False, line_width=size)
-    for size, here in _by_size(OVERSAMPLING * frame.point_size):
-        mesh = pv.PolyData()
-        mesh.points = frame.points[here].reshape(-1, 3)
+        mesh.cell_data["rgb"] = _grained(frame.line_colour[part][here], corners)
+        _put(plotter, mesh, line_width=size)
+
+
+def _add_points(plotter: Any, frame: Frame, part: slice) -> None:
+    for size, here in _by_size(OVERSAMPLING * frame.point_size[part], frame.points[part], 2):
+        corners = frame.points[part][here]
+        mesh = import_pyvista().PolyData()
+        mesh.points = corners
         mesh.verts = _cells(len(here), 1)
-        mesh.cell_data["rgb"] = _grained(frame.point_colour[here], frame.points[here])
-        plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False, point_size=size)
+        mesh.cell_data["rgb"] = _grained(frame.point_colour[part][here], corners)
+        _put(plotter, mesh, point_size=size)
+
+
+def _put(plotter: Any, mesh: Any, **size: int) -> None:
+    """Add a mesh in its own colours, and leave the camera where it is."""
+    plotter.add_mesh(
+        mesh, scalars="rgb", rgb=True, lighting=False, reset_camera=False, render=False, **size
+    )
 
 
 def _grained(
@@ -249,8 +302,7 @@ def _grained(
 
     Leaves differ, and those of a crown's shady side would else be one even patch.
     """
-    x, y, z = vertices.reshape(len(vertices), -1)[:, :3].T
-    chance = np.modf(np.abs(np.sin(x * 12.9898 + y * 78.233 + z * 37.719)) * 4375.85)[0]
+    chance = _chance(vertices, 12.9898)
     grained = colour * (1.0 + grain * (2.0 * chance[:, None] - 1.0))
     return np.asarray(np.clip(grained, 0.0, 255.0), np.uint8)
 
@@ -261,8 +313,25 @@ def _cells(count: int, corners: int) -> NDArray[np.int64]:
     return np.column_stack((np.full(count, corners), index)).ravel()
 
 
-def _by_size(wanted: NDArray[Any]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Sort things into whole widths of fine pixels, for VTK draws one width at a time."""
-    size = np.clip(np.round(wanted), 1, _WIDEST_PX).astype(np.int64)
-    for one in np.unique(size):
+def _chance(vertices: NDArray[np.float32], number: float) -> NDArray[Any]:
+    """Give numbers (n,) from 0 to 1 that look random, by where first corners stand."""
+    x, y, z = vertices.reshape(len(vertices), prod(vertices.shape[1:]))[:, :3].T
+    wave = np.abs(np.sin(x * number + y * 78.233 + z * 37.719)) * 4375.85
+    return np.asarray(np.modf(wave)[0])
+
+
+def _by_size(
+    wanted: NDArray[Any], vertices: NDArray[np.float32], power: int
+) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    """Sort things into whole widths of fine pixels, for VTK draws one width at a time.
+
+    Each gets the next lower or higher one, so often that the mean of their power is right: trees
+    do not jump from one width to the other.
+    """
+    least = np.clip(np.floor(wanted), 1, _WIDEST_PX)
+    share = (np.clip(wanted, 1, _WIDEST_PX) ** power - least**power) / (
+        (least + 1) ** power - least**power
+    )
+    size = (least + (_chance(vertices, 24.3137) < share)).astype(np.int64)
+    for one in np.flatnonzero(np.bincount(size)):
         yield int(one), np.flatnonzero(size == one)

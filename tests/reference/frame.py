@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from forest.surface.camera import Camera
 from forest.surface.description import LEAF_ITEM, Primitives
-from forest.surface.detail import Sight, fractions
+from forest.surface.detail import LAST_LEVEL, Sight, fractions
 from forest.surface.instances import Instances, Model
-from forest.surface.light import sunlit
+from forest.surface.light import bark_step, bark_steps, sunlit
 from forest.surface.shadow import SceneShadow, ShadowMap
 
 Row = tuple[float, ...]
@@ -126,27 +126,50 @@ def colour_of(
     k = int(scene.instances.model[i])
     model = scene.models[k]
     item, element = int(primitives.item[p]), int(primitives.element[p])
-    normal = None
+    normal, points = None, [np.zeros(3)]
     if item == LEAF_ITEM:
         leaves, number, base = model.description.leaves, element, model.foliage[scene.season]
         normal = leaves.normal[element]
         middle = leaves.position[element] + leaves.length[element] / 2 * leaves.direction[element]
     else:
-        stems, base = model.description.stems[item], model.bark
+        stems = model.description.stems[item]
         number = stems.internode.tolist().index(element)
         middle = stems.centre[number].mean(axis=0)
+        diameter = np.float32(np.linalg.norm(stems.side[number], axis=1).sum())
+        red, green, blue = bark_steps(model.bark)[int(bark_step(diameter))]
+        base = (float(red), float(green), float(blue))
+        if item < LAST_LEVEL:
+            points = along_stem(stems.centre[number])
     light = sunlight(primitives.vertices[p], normal, scene.sun)
     if scene.shadows is not None:
         there = scene.instances.place[i] + scene.instances.scale[i] * np.float32(middle)
-        others = shaded_by_others(scene.shadows.map, i, there)
-        if scene.shadows.own[k].shaded[item][number] or others:
-            light = 0.0
+        others = [shaded_by_others(scene.shadows.map, i, there + way) for way in points]
+        light *= 1.0 - float(scene.shadows.own[k].shaded[item][number])
+        light *= 1.0 - sum(others) / len(others)
     lit = sunlit(np.array(base), np.array(light))
     hazy = 0.0 if scene.haze is None else 1.0 - math.exp(-distance / scene.haze)
     red, green, blue = (
         255.0 * ((1.0 - hazy) * lit[c] + hazy * scene.haze_colour[c]) for c in range(3)
     )
     return red, green, blue
+
+
+def along_stem(ends: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Ways to five points up to a metre along a stem, from its middle."""
+    way = ends[1] - ends[0]
+    length = float(np.linalg.norm(way))
+    unit = np.float32(way / length) if length > 0.0 else np.zeros(3)
+    return [step * unit for step in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+
+
+def mean_along(marks: list[float], lengths: list[float], k: int, reach: float) -> float:
+    """Mean of an axis' marks within a reach of the middle of internode `k`, weighed by length."""
+    middle = sum(lengths[:k]) + lengths[k] / 2
+    total, dark, at = 0.0, 0.0, 0.0
+    for mark, length in zip(marks, lengths, strict=True):
+        within = max(0.0, min(at + length, middle + reach) - max(at, middle - reach))
+        total, dark, at = total + within, dark + within * mark, at + length
+    return dark / total
 
 
 def nearest_hit(triangles: NDArray[np.float64], x: float, y: float, grown: float) -> float:

@@ -174,6 +174,17 @@ def test_stiffness_curve_shapes_fractures() -> None:
     assert gain(((0.009, 60.0), (0.014, 20.0))) == pytest.approx(3.0, rel=1e-6)
 
 
+def test_narrow_sides_yield_more() -> None:
+    """K = R w / l0: where a curved axis halves the strip, it opens twice as far (5.3)."""
+    geometry = column(1)._replace(width_around=np.array([[1.0, 0.5]]))
+    girth = np.array([[1.0], [1.01]])
+    bark = grow_bark(geometry, girth, Material(threshold=9.0))
+    bark = bark.trigger(0, 0.25).trigger(0, 0.75)
+    before, after = bark.elements, bark.grow(np.array([[1.05]])).elements
+    gains = [after.width[after.tear == k][0] - before.width[before.tear == k][0] for k in (0, 1)]
+    assert gains[1] == pytest.approx(2.0 * gains[0], rel=1e-6)
+
+
 def test_refracturing_tears_old_fractures() -> None:
     """Figure 9: the surface of one generation is the epidermis of the next."""
     girth = np.full(40, 1.2)

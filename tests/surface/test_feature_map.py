@@ -12,7 +12,15 @@ from PIL import Image
 from scipy.spatial.distance import pdist
 
 from forest.errors import InputError
-from forest.surface.feature_map import FeatureMap, Spreading, read_feature_map, spread
+from forest.surface.feature_map import (
+    FeatureMap,
+    Spreading,
+    _Room,
+    _settle,
+    asked_for,
+    read_feature_map,
+    spread,
+)
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -92,3 +100,29 @@ def test_bad_maps_are_refused(tmp_path: Path) -> None:
     for name in ("real.npy", "big.npy", "flat.npy", "map.jpg", "missing.png"):
         with pytest.raises(InputError, match=name.replace(".", r"\.")):
             read_feature_map(tmp_path / name)
+
+
+@given(seed=SEEDS, count=st.integers(0, 60), distance=st.sampled_from([0.01, 1.0, 4.0, 50.0]))
+@settings(max_examples=25, deadline=None)
+def test_spots_are_taken_one_after_the_other(seed: int, count: int, distance: float) -> None:
+    """As if each tree were compared with all before it that found room."""
+    size = (30.0, 11.0)
+    spots = np.random.default_rng(seed).uniform(0.0, 1.0, (count, 2)) * size
+    taken: list[np.ndarray] = []
+    expected = []
+    for spot in spots:
+        expected.append(all(np.sqrt(np.sum((spot - one) ** 2)) >= distance for one in taken))
+        if expected[-1]:
+            taken.append(spot)
+    room, free = _Room.of(size, distance, count), np.zeros(count, np.bool_)
+    trees = np.arange(count, dtype=np.int32)
+    half = count // 2
+    for part in (slice(0, half), slice(half, count)):
+        x, y = (np.ascontiguousarray(column) for column in spots[part].T)
+        _settle(room, trees[part], x, y, free[part])
+    assert free.tolist() == expected
+
+
+def test_what_is_asked_for_is_counted() -> None:
+    bits = np.array([[1, 0], [1, 2]], np.uint16)
+    assert asked_for(FeatureMap(bits, 10.0), Spreading(0, 333.0)) == round(333.0 * 200.0 / 1e4)

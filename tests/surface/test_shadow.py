@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from forest.surface import Instances, Model, own_shadows, prepare, scene_shadow
 from forest.surface.camera import Camera
 from forest.surface.detail import LAST_LEVEL
+from forest.surface.light import BARKS, bark_step, bark_steps
+from forest.surface.shadow import _along_stems
 from forest.trees.leaves import OVAL, Leaves
 from forest.trees.skeleton import Skeleton
 from tests.reference import frame as reference
@@ -123,3 +125,45 @@ def test_a_tree_behind_a_wall_of_trees_is_dark() -> None:
         frame = prepare([wall, single], place, camera, sun=sun, shadows=shade)
         last = frame.point_colour[-2:].astype(int).sum(axis=1)  # in order of models and instances
         assert (last < 1.1 * 255 * sum(FOLIAGE["summer"])).tolist() == expected
+
+
+@given(seed=st.integers(0, 10_000), axes=st.integers(0, 3))
+@settings(max_examples=25, deadline=None)
+def test_marks_of_stems_are_means_along_their_axes(seed: int, axes: int) -> None:
+    rng = np.random.default_rng(seed)
+    lines, marks, expected = [], [], []
+    for k in range(axes):
+        lengths = rng.uniform(0.01, 0.8, int(rng.integers(1, 12)))
+        own = rng.integers(0, 2, len(lengths)).astype(float)
+        at = np.append(0.0, np.cumsum(lengths))
+        points = np.float32(np.column_stack((0.0 * at + 5.0 * k, 0.0 * at, at)))
+        lines.append(np.hstack((points[:-1], points[1:])))
+        marks.append(own)
+        expected += [
+            reference.mean_along(own.tolist(), lengths.tolist(), i, 1.0) for i in range(len(own))
+        ]
+    if axes:
+        found = _along_stems(np.concatenate(marks).astype(np.float32), np.concatenate(lines))
+        np.testing.assert_allclose(found, expected, atol=1e-4)
+    nothing = _along_stems(np.empty(0, np.float32), np.empty((0, 6), np.float32))
+    assert len(nothing) == 0
+
+
+def test_a_trunk_has_no_hard_edges_of_shade() -> None:
+    """Internodes of 10 cm behind a leaf darken and lighten again within a metre both ways."""
+    line = np.zeros((80, 6), np.float32)
+    line[:, 2], line[:, 5] = np.arange(80) / 10, np.arange(1, 81) / 10
+    line[1:, 2] = line[:-1, 5]
+    marks = np.zeros(80, np.float32)
+    marks[40:43] = 1.0
+    shade = _along_stems(marks, line)
+    assert 0.1 < shade.max() < 0.2
+    assert np.abs(np.diff(shade)).max() < 0.06
+    assert shade[:30].max() == 0.0
+
+
+def test_twigs_of_pale_trees_are_darker() -> None:
+    steps = bark_steps((0.8, 0.8, 0.7))
+    assert steps.shape == (BARKS, 3)
+    assert (np.diff(steps, axis=0) < 0.0).all()
+    assert bark_step([0.3, 0.06, 0.01, 0.001]).tolist() == [0, 0, BARKS - 1, BARKS - 1]

@@ -176,7 +176,10 @@ def test_sample_trees_of_a_run_are_spread_like_others(scene: Path, run_file: Pat
     height = skeleton.end[:, 2].max() - skeleton.start[0, 2]
     assert built.heights[0] == pytest.approx(height)
     assert (built.instances.model[:-1] == 0).all()
-    with pytest.raises(InputError, match=r"trees\[0\].run: tree 999 is no sample tree"):
+    with pytest.raises(InputError, match=r"trees\[0\].year: .*a year from 2001 to 2008"):
+        wrong = SceneFile.from_toml(text.replace("per_ha", "year = 1999\nper_ha"))
+        build_scenery(wrong, scene.parent)
+    with pytest.raises(InputError, match=r"trees\[0\].sample: tree 999 is no sample tree"):
         wrong = SceneFile.from_toml(text.replace(f"sample = {sample}", "sample = 999"))
         build_scenery(wrong, scene.parent)
 
@@ -221,7 +224,8 @@ def test_the_command_draws_runs(run_file: Path, tmp_path: Path) -> None:
     [
         (("--eye", "1,2"), "--eye"),
         (("--towards", "a,b,c"), "--towards"),
-        (("--size", "10"), "--size"),
+        (("--size", "10"), "WxH"),
+        (("--tile", "1000"), "a tile of"),
         (("--size", "0x9"), "--size"),
         (("--sun", "10,-5"), "sun"),
         (("--season", "sumer"), "did you mean 'summer'"),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from forest.errors import InputError
 from forest.parametric import Parameters, ParametricTree, grow, load_parameters
 from forest.species.text import input_error
-from forest.surface.feature_map import FeatureMap, Spreading, read_feature_map, spread
+from forest.surface.feature_map import FeatureMap, Spreading, asked_for, read_feature_map, spread
 from forest.surface.grass import GRASSES, Grass
 from forest.surface.instances import Instances, Model
 from forest.surface.terrain import HeightField, read_heights
@@ -22,6 +23,8 @@ from forest.view.scenery.file import GrassTable, SceneFile, Trees
 from forest.view.scenery.scenery import Haze, Scenery, Viewpoint
 
 _Array = NDArray[np.float64]
+
+_MOVE_M = 8192.0  # scenes are moved by multiples of this, of which the grass takes no notice
 
 
 def load_scenery(path: str | Path) -> Scenery:
@@ -55,11 +58,16 @@ def build_scenery(scene: SceneFile, folder: str | Path = ".", *, where: str = "s
     folder = Path(folder)
     terrain = _terrain(scene, folder, where)
     features = _features(scene, folder, where)
-    stock = Stock()
-    instances = _stand(scene, folder, where, features, terrain, stock)
     (x0, y0), (width, depth) = scene.terrain.origin_m, scene.terrain.size_m
     if features or scene.terrain.heights:
         (x0, y0), (width, depth) = (features or terrain).origin, (features or terrain).size_m
+    scene, origin = _nearer(scene, (x0, y0))
+    x0, y0 = x0 - origin[0], y0 - origin[1]
+    terrain = replace(terrain, origin=_less(terrain.origin, origin))
+    if features:
+        features = replace(features, origin=_less(features.origin, origin))
+    stock = Stock()
+    instances, notes = _stand(scene, folder, where, features, terrain, stock)
     return Scenery(
         models=tuple(stock.models),
         instances=instances,
@@ -77,7 +85,35 @@ def build_scenery(scene: SceneFile, folder: str | Path = ".", *, where: str = "s
         view=Viewpoint(scene.camera.eye_m, scene.camera.towards_m, scene.camera.field_of_view_deg),
         size=scene.camera.size_px,
         seed=scene.seed,
+        notes=notes,
+        origin_m=origin,
     )
+
+
+def _nearer(scene: SceneFile, corner: tuple[float, float]) -> tuple[SceneFile, tuple[float, float]]:
+    """Count places from near the eye, or the ground's corner; single precision holds no others.
+
+    Gives the scene with its trees and its camera moved, and the origin in the file's coordinates.
+    """
+    camera = scene.camera
+    near = corner if camera.eye_m is None else camera.eye_m[:2]
+    x0, y0 = origin = (_whole(near[0]), _whole(near[1]))
+    points = {"eye_m": camera.eye_m, "towards_m": camera.towards_m}
+    moved = {key: (p[0] - x0, p[1] - y0, p[2]) for key, p in points.items() if p is not None}
+    trees = tuple(
+        tree.model_copy(update={"x_m": tree.x_m - x0, "y_m": tree.y_m - y0}) for tree in scene.tree
+    )
+    changes = {"camera": camera.model_copy(update=moved), "tree": trees}
+    return scene.model_copy(update=changes), origin
+
+
+def _whole(place_m: float) -> float:
+    """Give the multiple of `_MOVE_M` from 0 to a place; nothing near 0 is moved."""
+    return float(int(place_m / _MOVE_M)) * _MOVE_M
+
+
+def _less(place: tuple[float, float], origin: tuple[float, float]) -> tuple[float, float]:
+    return place[0] - origin[0], place[1] - origin[1]
 
 
 class Stock:
@@ -123,7 +159,13 @@ def parametric_model(tree: ParametricTree, looks_like: str = "") -> tuple[Model,
     else:
         bark, foliage = parametric_colours(parameters)
     model = Model.of(
-        tree.skeleton(), tree.leaves, evergreen=parameters.evergreen, bark=bark, foliage=foliage
+        tree.skeleton(),
+        tree.leaves,
+        evergreen=parameters.evergreen,
+        bark=bark,
+        foliage=foliage,
+        lobes=(parameters.lobes, parameters.lobe_depth),
+        lobed_levels=1 if parameters.leaves else parameters.depth,  # a cactus has them everywhere
     )
     return model, float(tree.nodes.position[:, 2].max())
 
@@ -162,8 +204,6 @@ def _features(scene: SceneFile, folder: Path, where: str) -> FeatureMap | None:
 
 
 def _grass(table: GrassTable) -> Grass:
-    from dataclasses import replace
-
     names = ("height_m", "per_m2", "curve", "foot", "tip")
     changes = {name: getattr(table, name) for name in names}
     given: dict[str, Any] = {name: value for name, value in changes.items() if value is not None}
@@ -184,11 +224,12 @@ def _stand(
     features: FeatureMap | None,
     terrain: HeightField,
     stock: Stock,
-) -> Instances:
-    """Put up all trees: those spread over the map, then the single ones."""
+) -> tuple[Instances, tuple[str, ...]]:
+    """Put up all trees: those spread over the map, then the single ones; tell what had no room."""
     model: list[NDArray[np.int64]] = []
     places: list[_Array] = []
     scales: list[_Array] = []
+    notes: list[str] = []
     if features is not None and scene.trees:
         variants = [
             np.array(_variants(row, folder, where, f"trees[{number}]", stock))
@@ -206,8 +247,14 @@ def _stand(
         ]
         with _told(where, "trees"):
             trees = spread(features, kinds, scene.seed)
-        for number in range(len(kinds)):
+        for number, kind in enumerate(kinds):
             here = trees.kind == number
+            asked, found = asked_for(features, kind), int(here.sum())
+            if found < asked:
+                notes.append(
+                    f"trees[{number}]: {asked - found} of {asked} found no room "
+                    f"{kind.least_distance_m:g} m from each other"
+                )
             model.append(variants[number][trees.variant[here]])
             places.append(np.column_stack((trees.x[here], trees.y[here])))
             scales.append(trees.scale[here])
@@ -223,18 +270,19 @@ def _stand(
         places.append(np.array([[tree.x_m, tree.y_m]]))
         scales.append(np.array([factor]))
     x, y = np.concatenate((np.empty((0, 2)), *places)).T
-    return Instances.of(
+    instances = Instances.of(
         np.concatenate((np.empty(0, np.int64), *model)),
         np.column_stack((x, y, terrain.at(x, y))),
         np.concatenate((np.empty(0), *scales)),
     )
+    return instances, tuple(notes)
 
 
 def _variants(row: Trees, folder: Path, where: str, key: str, stock: Stock) -> list[int]:
     """Make the models of one kind of trees."""
     if row.species is None:
-        with _told(where, f"{key}.run"):
-            return [stock.number((row.run, row.sample, row.year), lambda: _sample(row, folder))]
+        take = (row.run, row.sample, row.year)
+        return [stock.number(take, lambda: _sample(row, folder, where, key))]
     with _told(where, f"{key}.species"):
         parameters = _parameters(row.species, folder)
     return [
@@ -255,15 +303,28 @@ def _parameters(species: str, folder: Path) -> Parameters:
     return load_parameters(folder / species if species.endswith(".toml") else species)
 
 
-def _sample(row: Trees, folder: Path) -> tuple[Model, float]:
-    """Take a sample tree out of a run."""
+def _sample(row: Trees, folder: Path, where: str, key: str) -> tuple[Model, float]:
+    """Take a sample tree out of a run; `key` names the kind of trees in messages."""
     from forest.record.run import open_run
     from forest.view.scenery.from_run import simulated_model
 
     assert row.run is not None and row.sample is not None
-    with open_run(folder / row.run) as run:
+    with ExitStack() as stack:
+        with _told(where, f"{key}.run"):
+            run = stack.enter_context(open_run(folder / row.run))
         if row.sample not in run.samples:
             expected = ", ".join(map(str, run.samples)) or "none, for this run has no sample trees"
-            raise InputError(f"tree {row.sample} is no sample tree", expected=expected)
-        year = int(run.sample_years(row.sample)[-1]) if row.year is None else row.year
+            raise input_error(
+                f"tree {row.sample} is no sample tree",
+                where=f"{where}: {key}.sample",
+                expected=expected,
+            )
+        years = [int(year) for year in run.sample_years(row.sample)]
+        year = years[-1] if row.year is None else row.year
+        if year not in years:
+            raise input_error(
+                f"tree {row.sample} is not on record in {year}",
+                where=f"{where}: {key}.year",
+                expected=f"a year from {years[0]} to {years[-1]}",
+            )
         return simulated_model(run.skeleton(row.sample, year), run.scenario.species)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from forest.parametric import Parameters
 from forest.surface.detail import SEASONS
 from forest.view.looks import look_of
-from forest.view.parametric_picture import colour_of, leaf_colour
+from forest.view.parametric_picture import WINTER_DULL, WINTER_SHARE, colour_of, leaf_colour
 
 RGB = tuple[float, float, float]
 
@@ -52,7 +52,7 @@ def colours_of(species: str, *, evergreen: bool) -> Colours:
     look = look_of(species)
     bark, summer = look.bark, look.leaf
     if evergreen:
-        dull = _mixed(summer, (0.30, 0.33, 0.22), 0.25)
+        dull = _mixed(summer, WINTER_DULL, WINTER_SHARE)
         young = _mixed(summer, _FRESH, 0.25)
         return Colours(bark, {"spring": young, "summer": summer, "fall": summer, "winter": dull})
     fall = _FALL.get(species, (0.75, 0.52, 0.15))

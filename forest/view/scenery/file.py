@@ -14,7 +14,7 @@ from forest.surface.feature_map import TREE_BITS
 _Part = Annotated[float, Field(ge=0.0, le=1.0)]
 _RGB = tuple[_Part, _Part, _Part]
 _Length = Annotated[float, Field(gt=0.0, le=1e6)]
-_Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+_Coordinate = Annotated[float, Field(ge=-1e8, le=1e8)]  # metres of any national grid
 _Place = tuple[_Coordinate, _Coordinate]
 _Point = tuple[_Coordinate, _Coordinate, _Coordinate]
 _Pixels = Annotated[int, Field(ge=16, le=16384)]
@@ -84,8 +84,8 @@ class Trees(Table):
 class Tree(Table):
     """A single tree."""
 
-    x_m: float = quantity(..., "place", unit="m", ge=-1e6, le=1e6)
-    y_m: float = quantity(..., "place", unit="m", ge=-1e6, le=1e6)
+    x_m: float = quantity(..., "place", unit="m", ge=-1e8, le=1e8)
+    y_m: float = quantity(..., "place", unit="m", ge=-1e8, le=1e8)
     species: str = quantity(..., "parametric species, or a TOML file of one", unit="")
     height_m: float | None = quantity(None, "height; its own if not given", unit="m", gt=0, le=300)
     seed: int = quantity(0, "each seed is another tree", ge=0, le=2**62)

@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError
-from forest.parametric import load_parameters
+from forest.parametric import Parameters, load_parameters
 from forest.record.run import Run
+from forest.residual import GrownResidual, grow_residual
 from forest.species import Species
 from forest.surface.grass import GRASSES
 from forest.surface.instances import Instances, Model
 from forest.surface.terrain import HeightField
-from forest.trees.leaves import leaves_of
+from forest.trees.leaves import Leaves, leaves_of
 from forest.trees.skeleton import Skeleton
 from forest.view.scenery.build import Stock, grow_light, parametric_model
-from forest.view.scenery.colours import colours_of
+from forest.view.scenery.colours import colours_of, parametric_colours
 from forest.view.scenery.scenery import Scenery
 
 if TYPE_CHECKING:
@@ -38,6 +39,11 @@ _Codes = NDArray[np.uint8]
 
 _STAND_IN_SEEDS = 3
 _MOST_LEAVES = 20_000
+#: Of a residual tree, which is single and often near.
+MOST_RESIDUAL_LEAVES = 200_000
+_ALL_RESIDUAL_LEAVES = 4_000_000  # of all of them together
+#: Trees of a view at most, those of all repeats together.
+MOST_TILED = 200_000
 #: Shapes of a species that are kept at most; other trees take the one that is nearest in height.
 MOST_SHAPES = 60
 
@@ -51,6 +57,7 @@ class _Shape(NamedTuple):
     height_m: float
     model: int
     tree_id: int
+    year: int
 
 
 def simulated_model(skeleton: Skeleton, species: Mapping[str, Species]) -> tuple[Model, float]:
@@ -73,15 +80,16 @@ def scenery_of_run(
     year: int | None = None,
     *,
     shapes: Iterable[Skeleton] = (),
+    shapes_year: int | None = None,
     tile: int = 1,
     grass: str | None = "meadow",
 ) -> Scenery:
     """Put up the living trees of a year at their places.
 
-    A tree whose shape is on record, among the sample trees or in `shapes`, stands as it is. Others
-    take the shape of their species that is nearest in height, scaled to their own. If there is
-    none, a parametric species stands in (`STAND_INS`), scaled likewise. Residual trees that stand
-    are put up in their own form.
+    A tree whose shape of that year is on record, among the sample trees or in `shapes`, stands as
+    it is. Others take the shape of their species that is nearest in height, scaled to their own;
+    of a sample tree that of the year nearest to this one. If there is none, a parametric species
+    stands in (`STAND_INS`), scaled likewise. Residual trees that stand are put up as they are.
 
     Parameters
     ----------
@@ -90,7 +98,9 @@ def scenery_of_run(
     year : int, optional
         Calendar year; the last one if not given.
     shapes : iterable of Skeleton
-        More trees of that year, e.g. those of a checkpoint.
+        More trees, e.g. those of a checkpoint.
+    shapes_year : int, optional
+        Their calendar year; the view's unless given.
     tile : int
         The plot is repeated so many times along x and along y, as scenery around the one in the
         middle.
@@ -100,25 +110,30 @@ def scenery_of_run(
     Raises
     ------
     InputError
-        If there is no table of trees, or the year is not on record.
+        If there is no table of trees, the year is not on record, or there are more than
+        `MOST_TILED` trees with all repeats.
     """
     year = _year(run, year)
     columns = ["tree_id", "species", "x_m", "y_m", "height_m", "status"]
     trees = run.read("trees", columns, years=(year, year))
     trees = trees[(trees["status"] == "living") & (trees["height_m"] > 0.0)]
     stock = Stock()
-    known = _shapes_on_record(run, year, shapes, stock)
+    _check_tile(len(trees), tile)
+    known = _shapes_on_record(
+        run, year, shapes, year if shapes_year is None else shapes_year, stock
+    )
     names = trees["species"].astype(str).to_numpy()
     ids, heights = trees["tree_id"].to_numpy(), trees["height_m"].to_numpy(np.float64)
     model = np.zeros(len(trees), np.int64)
     as_it_is = np.zeros(len(trees), np.bool_)
     stand_in = 0
+    lent: set[int] = set()
     for k, name in enumerate(names):
         if known.get(name):
-            best = min(
-                known[name], key=lambda s: (s.tree_id != ids[k], abs(s.height_m - heights[k]))
-            )
-            model[k], as_it_is[k] = best.model, best.tree_id == ids[k]
+            best = _best(known[name], int(ids[k]), float(heights[k]), year)
+            model[k], as_it_is[k] = best.model, best.tree_id == ids[k] and best.year == year
+            if not as_it_is[k]:
+                lent.add(best.year)
         else:
             seed = int(ids[k]) % _STAND_IN_SEEDS
             model[k] = _stand_in(name, seed, run.scenario.species[name].group, stock)
@@ -126,7 +141,7 @@ def scenery_of_run(
     model_of_residual, residual = _residual(run, year, stock)
     model = np.concatenate((model, model_of_residual))
     heights = np.concatenate((heights, residual["height_m"].to_numpy(np.float64)))
-    as_it_is = np.concatenate((as_it_is, np.zeros(len(residual), np.bool_)))
+    as_it_is = np.concatenate((as_it_is, np.ones(len(residual), np.bool_)))
     spots = np.concatenate([t[["x_m", "y_m"]].to_numpy(np.float64) for t in (trees, residual)])
     sizes = np.array(stock.heights)
     scale = np.where(as_it_is, 1.0, heights / sizes[model]) if len(model) else np.empty(0)
@@ -150,7 +165,28 @@ def scenery_of_run(
         grasses={1: GRASSES[grass]} if grass else {},
         grass_at=_grass_around(extent),
         ground=_LITTER,
-        notes=_told(year, as_it_is, stand_in, names, tile),
+        notes=_told(year, as_it_is[: len(names)], stand_in, lent, tile),
+    )
+
+
+def _check_tile(trees: int, tile: int) -> None:
+    if trees * tile**2 > MOST_TILED:
+        most = int((MOST_TILED / trees) ** 0.5)
+        raise InputError(
+            f"{tile} x {tile} plots of {trees} trees are {trees * tile**2:,} trees",
+            expected=f"at most {MOST_TILED:,}: a tile of {max(most, 1)} or less",
+        )
+
+
+def _best(known: list[_Shape], tree_id: int, height_m: float, year: int) -> _Shape:
+    """Choose a tree's shape: its own of the year, or that which is nearest in height."""
+    return min(
+        known,
+        key=lambda s: (
+            s.tree_id != tree_id or s.year != year,
+            abs(s.height_m - height_m),
+            s.tree_id != tree_id,
+        ),
     )
 
 
@@ -179,17 +215,20 @@ def _year(run: Run, year: int | None) -> int:
 
 
 def _shapes_on_record(
-    run: Run, year: int, shapes: Iterable[Skeleton], stock: Stock
+    run: Run, year: int, shapes: Iterable[Skeleton], shapes_year: int, stock: Stock
 ) -> dict[str, list[_Shape]]:
-    """Make models of the shapes of that year, for each species evenly over the heights."""
-    found = {
-        tree_id: run.skeleton(tree_id, year)
-        for tree_id in run.samples
-        if year in run.sample_years(tree_id)
-    }
-    samples = set(found)
+    """Make models of the shapes nearest to that year, for each species evenly over the heights."""
+    years: dict[int, int] = {}
+    for tree_id in run.samples:
+        recorded = [int(one) for one in run.sample_years(tree_id)]
+        if recorded:
+            years[tree_id] = min(recorded, key=lambda one: (abs(one - year), one))
+    samples = set(years)
+    found = {tree_id: run.skeleton(tree_id, at) for tree_id, at in years.items()}
     for skeleton in shapes:
-        found.setdefault(skeleton.tree_id, skeleton)
+        at = years.get(skeleton.tree_id)
+        if at is None or abs(shapes_year - year) < abs(at - year):
+            found[skeleton.tree_id], years[skeleton.tree_id] = skeleton, shapes_year
     by_species: dict[str, list[Skeleton]] = {}
     for skeleton in sorted(found.values(), key=lambda s: float(s.end[:, 2].max())):
         by_species.setdefault(skeleton.species, []).append(skeleton)
@@ -203,7 +242,7 @@ def _shapes_on_record(
                 lambda s=skeleton: simulated_model(s, run.scenario.species),  # type: ignore[misc]
             )
             known.setdefault(name, []).append(
-                _Shape(stock.heights[number], number, skeleton.tree_id)
+                _Shape(stock.heights[number], number, skeleton.tree_id, years[skeleton.tree_id])
             )
     return known
 
@@ -217,19 +256,50 @@ def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.
     rows = run.read("residual", years=(year, year))
     rows = rows[rows["status"] == "standing"]
     number = []
+    most = min(MOST_RESIDUAL_LEAVES, _ALL_RESIDUAL_LEAVES // max(len(rows), 1))
     for one in rows["residual_id"]:
-        tree = run.scenario.residual_trees[one - 1]
-        assert tree.parameters is not None  # filled in when the scenario was read
-        parameters, seed = tree.parameters, tree.seed
+        wanted = run.scenario.residual_trees[one - 1]
+        assert wanted.parameters is not None  # filled in when the scenario was read
+        tree = grow_residual(wanted, int(one))
         number.append(
             stock.number(
-                ("residual", parameters, seed),
-                lambda p=parameters, s=seed: parametric_model(  # type: ignore[misc]
-                    grow_light(p, s, _MOST_LEAVES)
-                ),
+                ("residual", one),
+                lambda t=tree, p=wanted.parameters: residual_model(t, p, most),  # type: ignore[misc]
             )
         )
     return np.array(number, np.int64), rows
+
+
+def residual_model(
+    tree: GrownResidual, parameters: Parameters, most_leaves: int
+) -> tuple[Model, float]:
+    """Make the model of a residual tree as it stands in the run, and give its height, m.
+
+    Its stems have its own radii, its leaves its leaf area in all; of more than
+    `most_leaves` every so-manieth is drawn, larger.
+    """
+    bark, foliage = parametric_colours(parameters)
+    model = Model.of(
+        tree.skeleton,
+        _fewer(tree.leaves, most_leaves),
+        evergreen=parameters.evergreen,
+        bark=bark,
+        foliage=foliage,
+        lobes=(parameters.lobes, parameters.lobe_depth),
+        lobed_levels=1 if parameters.leaves else parameters.depth,
+    )
+    return model, tree.height_m
+
+
+def _fewer(leaves: Leaves, most: int) -> Leaves:
+    """Take an even part of the leaves at most, so much larger that their area in all stays."""
+    total = len(leaves.stem)
+    if total <= most:
+        return leaves
+    columns: list[Any] = [column[np.arange(most) * total // most] for column in leaves]
+    some = Leaves(*columns)
+    size = float(np.sqrt(leaves.area.sum() / max(some.area.sum(), 1e-12)))
+    return some._replace(length=size * some.length, width=size * some.width)
 
 
 def _stand_in(species: str, seed: int, group: str, stock: Stock) -> int:
@@ -244,12 +314,13 @@ def _stand_in(species: str, seed: int, group: str, stock: Stock) -> int:
 
 
 def _told(
-    year: int, as_it_is: NDArray[np.bool_], stand_in: int, names: NDArray[np.str_], tile: int
+    year: int, as_it_is: NDArray[np.bool_], stand_in: int, lent: set[int], tile: int
 ) -> tuple[str, ...]:
-    own = int(as_it_is.sum())
+    own, total = int(as_it_is.sum()), len(as_it_is)
+    of_years = f" (shapes of {', '.join(map(str, sorted(lent)))})" if lent else ""
     notes = [
-        f"{len(names)} living trees in {year}: {own} as they are on record, "
-        f"{len(names) - own - stand_in} scaled from the nearest in height of their species, "
+        f"{total} living trees in {year}: {own} as they are on record, "
+        f"{total - own - stand_in} scaled from the nearest in height of their species{of_years}, "
         f"{stand_in} by parametric stand-ins"
     ]
     if tile > 1:

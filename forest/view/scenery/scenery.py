@@ -75,6 +75,9 @@ class Scenery:
         By code.
     grass_at : callable
         Code of the grass at places x, y.
+    origin_m : tuple of float
+        What was taken off all x and y, m: `instances`, `terrain`, `extent` and the camera count
+        from here, since what is drawn has single precision.
     extent : (x0, y0, x1, y1)
         The ground that is the scene's own, m; beyond it the ground only goes on.
     sun_azimuth_deg, sun_elevation_deg : float
@@ -100,6 +103,7 @@ class Scenery:
     size: tuple[int, int] = (1200, 750)
     seed: int = 1
     notes: tuple[str, ...] = ()
+    origin_m: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Check the sun."""
