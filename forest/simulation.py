@@ -244,7 +244,7 @@ def _so_far(scenario: Scenario, years_done: int) -> dict[str, Any]:
         climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]
     del content["years"], content["planned_years"]
     samples = content["output"]["sample_trees"]
-    del samples["meshes"]
+    del samples["meshes"], samples["bark"]
     if samples["at_year"] == scenario.calendar[-1] or samples["at_year"] not in done:
         samples["at_year"] = None
     return content

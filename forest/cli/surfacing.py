@@ -59,7 +59,7 @@ def mesh(
 
     check_targets((to, (*MESH, ".png")), force=force)
     with open_run(run_file) as run:
-        _check_sample(run, tree)
+        check_sample(run, tree)
         at = int(run.sample_years(tree)[-1]) if year is None else year
         skeleton = run.skeleton(tree, at)
         species = species_of(run, skeleton)
@@ -92,7 +92,7 @@ def working(what: str) -> Any:
     return Console(stderr=True).status(what)
 
 
-def _check_sample(run: Any, tree: int) -> None:
+def check_sample(run: Any, tree: int) -> None:
     from forest.errors import InputError
 
     if tree not in run.samples:

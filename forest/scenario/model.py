@@ -375,6 +375,11 @@ class SampleTrees(Table):
         "last year, into the folder RUN_meshes beside the run file",
         unit="",
     )
+    bark: bool = quantity(
+        False,
+        "whether these surfaces have bark that tears as the tree grew, and its maps beside them",
+        unit="",
+    )
 
 
 class Output(Table):

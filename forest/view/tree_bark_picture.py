@@ -16,9 +16,9 @@ from forest.surface.bark.tree_bark import TreeBark
 from forest.surface.export import Part
 from forest.view.scene import import_pyvista, open_plotter, pixels
 
-_LIGHT = (-0.75, -0.55, 0.35)
+_LIGHT = (-0.6, -0.8, 0.45)
 _BEARING_DEG = -80.0
-_AMBIENT = 0.22
+_AMBIENT = 0.32
 _MARGIN = 1.06
 _LEAST_CELL_M = 0.002
 _CELLS = 500  # across a piece, where that is coarser
@@ -125,7 +125,8 @@ def _add(plotter: Any, part: Part) -> None:
     column = np.floor(np.mod(own[:, 0], 1.0) * columns).astype(np.int64) % columns
     row = np.clip(rows - 1 - np.floor(own[:, 1] * rows).astype(np.int64), 0, rows - 1)
     shade = rough[row, column, :1].astype(np.float64) / 255.0
-    colour = (image[row, column] * (0.35 + 0.65 * shade)).astype(np.uint8)
+    lit = image[row, column] * (0.45 + 0.8 * shade)
+    colour = np.minimum(lit, 255.0).astype(np.uint8)
     n = len(mesh.triangles)
     made = pv.PolyData(mesh.points, np.column_stack((np.full(n, 3), mesh.triangles)).ravel())
     made.point_data["colour"] = colour

@@ -144,13 +144,24 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line("an aspen's moment of wind, ms", (f"{1e3 * forms['sway_s']:.1f}",))
     yield from _frame_lines(result["frames"])
 <<<<<<< HEAD
+<<<<<<< HEAD
+=======
+>>>>>>> 952e87b678378d450d58cfdaaf6985e2a8d09a8f
     skin = result["surfaces"]
     yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
+<<<<<<< HEAD
 =======
     yield from _bark_lines(result["bark"])
 >>>>>>> cab0d683de733c39e926790db334a5e580d023c0
+=======
+    yield from _bark_lines(result["bark"])
+    maps = result["bark_maps"]
+    yield Line(f"Maps of a trunk, {maps['size']} x {maps['size']}", ())
+    for key, what in (("maps", "4K set: textures, maps, s"), ("save", "4K set: its PNGs, s")):
+        yield Line(what, (f"{maps[key + '_s']:.1f}", f"{maps[key + '_cpu_s']:.1f}"))
+>>>>>>> 952e87b678378d450d58cfdaaf6985e2a8d09a8f
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")

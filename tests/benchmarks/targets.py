@@ -60,6 +60,8 @@ def verdicts(result: dict[str, Any]) -> Iterator[Verdict]:
         yield Verdict("a frame of 10,000 trees, s", frame["shaded_s"], "≤", 2.0)
     surfaces = result["surfaces"]
     yield Verdict("tubes of 50,000 internodes, s", surfaces["tubes_s"], "≤", 1.0)
+    maps = result["bark_maps"]
+    yield Verdict("4K set of a trunk, s", maps["maps_s"] + maps["save_s"], "≤", 10.0)
     yield Verdict("bark of 225 strips, s", result["bark"]["225 strips"]["wall_s"], "≤", 2.0)
     yield Verdict("share of writing", run["writing_share"], "≤", 0.10)
     yield Verdict("cold start, s", starts["cold_s"], "≤", 45.0)

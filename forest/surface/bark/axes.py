@@ -265,6 +265,7 @@ def _emerges(path: AxisPath, parent: AxisPath) -> float:
 def _geometry(paths: list[AxisPath], counts: list[int]) -> StripGeometry:
     axis, along, width, factor = [], [], [], []
     for path, count in zip(paths, counts, strict=True):
+        v: _Floats
         step = (path.high - path.low) / count
         v = path.low + (np.arange(count) + 0.5) * step
         axis.append(np.full(count, path.axis, np.int32))

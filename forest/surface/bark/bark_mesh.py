@@ -206,9 +206,7 @@ def _rows(maps: BarkMaps, low: float) -> _Floats:
     return low + maps.length_m * np.concatenate(([0.0], middles, [1.0]))
 
 
-def _tube(
-    path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton: Skeleton
-) -> Mesh:
+def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton: Skeleton) -> Mesh:
     """Lay a closed tube with a point for each pixel of a map, raised by its height."""
     height = maps.height_m[::-1]
     height = np.vstack((height[:1], height, height[-1:]))
@@ -224,18 +222,18 @@ def _tube(
     ahead = (j + 1) % columns
     a, b = k * columns + j, k * columns + ahead
     bands = np.stack(((a, b, b + columns), (a, b + columns, a + columns)), axis=0)
-    j = np.arange(columns)
-    ahead = (j + 1) % columns
+    one = np.arange(columns)
+    two = (one + 1) % columns
     foot, head = rings * columns, rings * columns + 1
     top = (rings - 1) * columns
     triangles = np.concatenate(
         (
             bands.transpose(2, 3, 0, 1).reshape(-1, 3),
-            np.column_stack((np.full(columns, foot), ahead, j)),
-            np.column_stack((np.full(columns, head), top + j, top + ahead)),
+            np.column_stack((np.full(columns, foot), two, one)),
+            np.column_stack((np.full(columns, head), top + one, top + two)),
         )
     )
-    turn = np.concatenate((np.tile((j + 0.5) / columns, rings), [0.5, 0.5]))
+    turn = np.concatenate((np.tile((one + 0.5) / columns, rings), [0.5, 0.5]))
     share = np.concatenate((np.repeat((v - low) / maps.length_m, columns), [0.0, 1.0]))
     row = path.rows[path.internode(np.concatenate((np.repeat(v, columns), v[[0, -1]])))]
     known: dict[str, Any] = {

@@ -30,11 +30,11 @@ class _Place(NamedTuple):
 
     path: AxisPath
     first: int
-    count: int
+    strips: int
 
     @property
     def step(self) -> float:
-        return (self.path.high - self.path.low) / self.count
+        return (self.path.high - self.path.low) / self.strips
 
     def v(self, strip: NDArray[np.int64]) -> _Floats:
         """Give the middles of strips, counted from the axis' lowest one."""
@@ -44,12 +44,10 @@ class _Place(NamedTuple):
     def strip(self, v: _Floats) -> NDArray[np.int64]:
         """Find the strips at some places, the first and the last beyond them."""
         found = np.floor((v - self.path.low) / self.step).astype(np.int64)
-        return np.clip(found, 0, self.count - 1)
+        return np.clip(found, 0, self.strips - 1)
 
 
-def passages(
-    paths: Sequence[AxisPath], first: Sequence[int], counts: Sequence[int]
-) -> Crossings:
+def passages(paths: Sequence[AxisPath], first: Sequence[int], counts: Sequence[int]) -> Crossings:
     """Find where fractures pass from parents to children, and back.
 
     Parameters
@@ -69,7 +67,7 @@ def passages(
         if bearer is not None:
             near = _near(bearer, place)
             found += [_across(bearer, place, near, way, onto_child=True) for way in (1, -1)]
-            foot = np.arange(min(place.count, _strips_of_foot(place, bearer)))
+            foot = np.arange(min(place.strips, _strips_of_foot(place, bearer)))
             found.append(_across(place, bearer, foot, -1, onto_child=False))
     if not found:
         return Crossings.none()

@@ -112,9 +112,15 @@ def relief_of(preset: Preset, girth: NDArray[np.float64], *, generation: int, se
 def rows_at(preset: Preset, v: NDArray[np.float64], girth: NDArray[np.float64]) -> Rows:
     """Give what changes from row to row; `girth` is that of the stem it stands for."""
     aged = preset.aged(girth)
-    names = ("old_skin", "old_inside", "grime", "stain")
     return Rows(
-        v, girth, *(aged[name] for name in names), depth=aged["depth_m"], lichen=aged["lichen"]
+        v=v,
+        girth=girth,
+        old_skin=aged["old_skin"],
+        old_inside=aged["old_inside"],
+        grime=aged["grime"],
+        stain=aged["stain"],
+        depth=aged["depth_m"],
+        lichen=aged["lichen"],
     )
 
 
@@ -142,11 +148,12 @@ class Dress(NamedTuple):
     def surfaces(self, outlines: Silhouettes) -> Surfaces:
         """Lay out the textures: whole tiles around, and along where the bark continues."""
         rest = float(np.mean(outlines.rest))
-        along = [
-            _per_metre(texture.size_m[1], outlines) for texture in (*self.skin, *self.inside)
-        ]
+        along = [_per_metre(texture.size_m[1], outlines) for texture in (*self.skin, *self.inside)]
         return Surfaces(
-            *(texture.pixels for texture in (*self.skin, *self.inside)),
+            skin=self.skin[0].pixels,
+            skin_old=self.skin[1].pixels,
+            inside=self.inside[0].pixels,
+            inside_old=self.inside[1].pixels,
             around=np.array([max(1.0, np.round(rest / one.size_m[0])) for one in self.skin]),
             across=np.array([1.0 / one.size_m[0] for one in self.inside]),
             along=np.array(along),

@@ -141,7 +141,9 @@ def bark_geometry(
     points, edges = _welded(points, edges + len(frame))
     corner = np.array([[turns[0] * girth, low], [turns[1] * girth, high]])
     triangles = _sound_triangles(points, edges, corner)
-    return _raised(bark, preset, surface, outlines, points / [girth, 1.0], triangles, girth_m, turns)
+    return _raised(
+        bark, preset, surface, outlines, points / [girth, 1.0], triangles, girth_m, turns
+    )
 
 
 def _lines(
@@ -203,8 +205,8 @@ def _frame(
     turns: tuple[float, float], span: tuple[float, float], spacing: float, girth: float
 ) -> _Floats:
     """Points on the piece's border and, staggered, over all of it."""
-    across = max(2, int(np.ceil((turns[1] - turns[0]) * girth / spacing)))
-    along = max(2, int(np.ceil((span[1] - span[0]) / spacing)))
+    across = max(2, int(np.ceil((turns[1] - turns[0]) * girth / spacing - 1e-6)))
+    along = max(2, int(np.ceil((span[1] - span[0]) / spacing - 1e-6)))
     turn = np.linspace(turns[0], turns[1], across + 1)
     v = np.linspace(span[0], span[1], along + 1)
     inner_t, inner_v = np.meshgrid(turn[1:-1], v[1:-1])
@@ -276,8 +278,11 @@ def _triangulate(points: _Floats, edges: _Edges) -> NDArray[np.int64]:
     data = vtkPolyData()
     data.SetPoints(place)
     lines = vtkCellArray()
-    cells = np.column_stack((np.full(len(edges), 2), edges)).astype(np.int64)
-    lines.SetCells(len(edges), numpy_to_vtkIdTypeArray(cells.ravel(), deep=1))
+    starts = 2 * np.arange(len(edges) + 1, dtype=np.int64)
+    lines.SetData(
+        numpy_to_vtkIdTypeArray(starts, deep=1),
+        numpy_to_vtkIdTypeArray(np.ascontiguousarray(edges, np.int64).ravel(), deep=1),
+    )
     constraints = vtkPolyData()
     constraints.SetPoints(place)
     constraints.SetLines(lines)
@@ -286,12 +291,12 @@ def _triangulate(points: _Floats, edges: _Edges) -> NDArray[np.int64]:
     maker.SetSourceData(constraints)
     maker.SetTolerance(0.0)
     maker.Update()
-    found = vtk_to_numpy(maker.GetOutput().GetPolys().GetData()).reshape(-1, 4)[:, 1:]
-    triangles = np.asarray(found, np.int64)
+    found = vtk_to_numpy(maker.GetOutput().GetPolys().GetConnectivityArray())
+    triangles = np.array(found, np.int64).reshape(-1, 3)
     a, b, c = (points[triangles[:, k]] for k in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     triangles[area < 0.0] = triangles[area < 0.0][:, ::-1]
-    return triangles[area != 0.0]
+    return np.asarray(triangles[area != 0.0], np.int64)
 
 
 def _raised(

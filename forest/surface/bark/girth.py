@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +85,7 @@ def recorded_girths(
         raise InputError("radii of another skeleton", where="bark", expected="its own")
     radius = np.full((len(wood.years), len(tree.geometry.axis)), np.nan)
     uneven = bool(np.any(wood.eccentricity != 0.0)) or flare is not None
-    outlines = np.zeros((*radius.shape, _OUTLINE), np.float32) if uneven else None
+    outlines = np.zeros((*radius.shape, _OUTLINE)) if uneven else None
     foot = None if flare is None else flare.columns(tree.skeleton)
     pith = centres(
         np.diff(wood.radius, axis=0, prepend=wood.radius[:1]),
@@ -112,7 +113,7 @@ def recorded_girths(
     girth = np.where(there, np.stack([perimeter(row) for row in outlines]), np.nan)
     girth = np.where(there, np.fmax.accumulate(girth, axis=0), np.nan)
     spread = np.stack(
-        [radial_projection(a, b)[1] for a, b in zip(outlines, outlines[1:], strict=False)]
+        [radial_projection(a, b)[1] for a, b in pairwise(outlines)]
     ) if len(outlines) > 1 else np.ones((0, *radius.shape[1:], GROWING))  # fmt: skip
     return GirthHistory(wood.years.astype(np.float64), girth, spread)
 
@@ -204,7 +205,7 @@ def linked_girths(
             expected="shapes that grow",
         )
     girth = np.maximum.accumulate(girth, axis=0)
-    spread = [radial_projection(a, b)[1] for a, b in zip(outlines, outlines[1:], strict=False)]
+    spread = [radial_projection(a, b)[1] for a, b in pairwise(outlines)]
     at = np.arange(float(len(shapes))) if times is None else np.asarray(times, np.float64)
     return GirthHistory(at, girth, np.stack(spread))
 

@@ -61,12 +61,12 @@ class _Room(NamedTuple):
 def profile_of(points: tuple[tuple[float, float], ...]) -> NDArray[np.float64]:
     """Sample a depth profile (figure 14): (share of the way to the middle, share of the depth)."""
     at, depth = np.array(points, np.float64).T
-    return np.interp(np.linspace(0.0, 1.0, _SAMPLES), at, depth)
+    return np.asarray(np.interp(np.linspace(0.0, 1.0, _SAMPLES), at, depth), np.float64)
 
 
 def rows_of(length: float, count: int, low: float = 0.0) -> NDArray[np.float64]:
     """Give the heights of a picture's rows, top row first, m."""
-    return low + (np.arange(count)[::-1] + 0.5) * (length / count)
+    return np.asarray(low + (np.arange(count)[::-1] + 0.5) * (length / count), np.float64)
 
 
 def fields(outlines: Silhouettes, relief: Relief, v: NDArray[np.float64], columns: int) -> Fields:
@@ -87,9 +87,7 @@ def fields(outlines: Silhouettes, relief: Relief, v: NDArray[np.float64], column
     -------
     Fields
     """
-    shape = (len(v), columns)
-    single = (np.empty(shape, np.float32) for _ in range(4))
-    out = Fields(*single, np.empty(shape, np.int32))
+    out = _empty(len(v), columns)
     in_threads(_fill, outlines, relief, _Room(scratch(outlines), v, np.zeros(len(v))), out)
     return out
 
@@ -98,12 +96,15 @@ def fields_at(
     outlines: Silhouettes, relief: Relief, turn: NDArray[np.float64], v: NDArray[np.float64]
 ) -> Fields:
     """Evaluate single points: turns and heights (n,), the relief of each; fields are (n, 1)."""
-    shape = (len(v), 1)
-    single = (np.empty(shape, np.float32) for _ in range(4))
-    out = Fields(*single, np.empty(shape, np.int32))
+    out = _empty(len(v), 1)
     # A row of one column has its point at half a turn.
     in_threads(_fill, outlines, relief, _Room(scratch(outlines), v, 0.5 - turn), out)
     return out
+
+
+def _empty(rows: int, columns: int) -> Fields:
+    depth, inside, epidermis, across = np.empty((4, rows, columns), np.float32)
+    return Fields(depth, inside, epidermis, across, np.empty((rows, columns), np.int32))
 
 
 def scratch(outlines: Silhouettes) -> NDArray[np.float64]:
@@ -118,13 +119,14 @@ def _fill(first: Any, step: Any, outlines: Any, relief: Any, room: Any, out: Any
         for row in range(chunk, len(room.v), CHUNKS):
             outline_row(
                 outlines, relief, row, room.v[row], room.offset[row], room.line[chunk],
-                out.depth[row], out.inside[row], out.epidermis[row], out.across[row], out.fracture[row],
+                out.depth[row], out.inside[row], out.epidermis[row], out.across[row],
+                out.fracture[row],
             )  # fmt: skip
 
 
 @njit
 def depth_of(opening: Any, deepest: Any, per_width: Any) -> Any:
-    """Depth of a fracture of some opening: in proportion at first, then no deeper than `deepest`."""
+    """Depth of a fracture of some opening: in proportion, but no deeper than `deepest`."""
     if deepest <= 0.0:
         return 0.0
     return deepest * (1.0 - np.exp(-opening * per_width / deepest))
@@ -166,7 +168,7 @@ def _gather(outlines: Any, relief: Any, row: Any, v: Any, offset: Any, line: Any
     spacing = relief.fray_length
     periods = 0
     if outlines.cyclic:
-        periods = max(1, np.int64(np.round(outlines.length / spacing)))
+        periods = max(1, int(np.round(outlines.length / spacing)))
         spacing = outlines.length / periods
     count = 0
     for i in range(outlines.offsets[k], outlines.offsets[k + 1]):
@@ -279,7 +281,7 @@ def _fill_fracture(
         from_right = (right - at) * girth
         near = min(from_left, from_right)
         share = min(near / half, 1.0) * (len(relief.profile) - 1)
-        k = min(np.int64(share), len(relief.profile) - 2)
+        k = min(int(share), len(relief.profile) - 2)
         way = relief.profile[k] + (share - k) * (relief.profile[k + 1] - relief.profile[k])
         edge = shoulder * one[7]
         deep = edge + (one[7] - edge) * way

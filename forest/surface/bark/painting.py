@@ -110,12 +110,17 @@ def sample(pixels: Any, u: Any, v: Any, weight: Any, out: Any) -> None:
     c, d = weight * (1.0 - s) * t, weight * s * t
     for i in range(5):
         out[i] += (
-            a * pixels[k, j, i] + b * pixels[k, j1, i] + c * pixels[k1, j, i] + d * pixels[k1, j1, i]
+            a * pixels[k, j, i]
+            + b * pixels[k, j1, i]
+            + c * pixels[k1, j, i]
+            + d * pixels[k1, j1, i]
         )
 
 
 @njit
-def _two(young: Any, old: Any, share: Any, u: Any, u_old: Any, v: Any, v_old: Any, out: Any) -> None:
+def _two(
+    young: Any, old: Any, share: Any, u: Any, u_old: Any, v: Any, v_old: Any, out: Any
+) -> None:
     """Blend the young and the old texture."""
     for i in range(5):
         out[i] = 0.0

@@ -49,9 +49,7 @@ def piece_of(bark: Bark, strips: NDArray[np.int64]) -> Bark:
         neighbour_down=_linked(place, cut.neighbour_down),
     )
     surface = None if bark.surface is None else piece_of(bark.surface, strips)
-    return replace(
-        bark, strips=cut, elements=elements, tears=nodes, surface=surface, history=()
-    )
+    return replace(bark, strips=cut, elements=elements, tears=nodes, surface=surface, history=())
 
 
 def _linked(place: NDArray[np.int32], to: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -59,8 +57,7 @@ def _linked(place: NDArray[np.int32], to: NDArray[np.int32]) -> NDArray[np.int32
 
 
 def rescaled(bark: Bark, girth: NDArray[np.float64]) -> Bark:
-    """Give the same bark on strips of other girths: all that lies around them scales.
-    """
+    """Give the same bark on strips of other girths: all that lies around them scales."""
     factor = girth / bark.strips.girth
     counts = np.diff(bark.elements.offsets)
     each = np.repeat(factor, counts)

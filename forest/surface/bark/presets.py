@@ -7,6 +7,7 @@ them and flat beyond.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -41,7 +42,7 @@ def _check(table: Table, limits: dict[str, tuple[float, float]]) -> None:
         value = getattr(table, key)
         pairs = value if isinstance(value, tuple) else ((0.0, value),)
         girths = [girth for girth, _ in pairs]
-        if not pairs or any(b <= a for a, b in zip(girths, girths[1:], strict=False)):
+        if not pairs or any(b <= a for a, b in pairwise(girths)):
             raise Refusal(f"{value}", key=key, expected="pairs [girth in m, value], girths rising")
         for _, number in pairs:
             if not least <= number <= most:
@@ -49,7 +50,7 @@ def _check(table: Table, limits: dict[str, tuple[float, float]]) -> None:
 
 
 class Tearing(Table):
-    """How the bark tears: what `forest.surface.bark.Material` and the girth's growth are made of."""
+    """How the bark tears: what its `Material` and its girth's growth are made of."""
 
     share: Ageing = quantity(..., "share of the girth that is torn open")
     again: Ageing = quantity(0.0, "share torn open in the surface of old fractures and plates")

@@ -23,13 +23,15 @@ class Marks(Table):
     high_mm: float = quantity(..., "mean size along it", unit="mm", gt=0, le=500)
     spread: float = quantity(0.4, "standard deviation of the logarithm of sizes", ge=0, le=2)
     shape: Literal["oval", "diamond"] = quantity("oval", "outline")
-    depth_mm: float = quantity(0.0, "how deep they lie; below 0 they stand out", unit="mm", ge=-20, le=20)
+    depth_mm: float = quantity(
+        0.0, "how deep they lie; below 0 they stand out", unit="mm", ge=-20, le=20
+    )
     colour: Colour = quantity(..., "sRGB, 0 to 255")
     cover: float = quantity(0.9, "how much of the ground's colour they hide", ge=0, le=1)
 
 
 class Cracks(Table):
-    """Micro-fractures: the surface torn again by the fracture model, at a smaller scale (section 7)."""
+    """Micro-fractures: the surface torn again by the fracture model, smaller (section 7)."""
 
     across: bool = quantity(False, "they run around the stem, not along it")
     spacing_mm: float = quantity(..., "mean distance between them", unit="mm", gt=0, le=500)

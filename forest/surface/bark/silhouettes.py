@@ -231,10 +231,16 @@ def _pieces(nodes: _Nodes, ring: _Ring, knots: _Floats, cyclic: bool) -> _Pieces
         return joined
     # The interval below the lowest strip is the one above the uppermost.
     twin = joined.interval == n
-    again = _Pieces(*(column[twin] for column in joined))._replace(
-        interval=np.zeros(int(twin.sum()), np.int64)
+    rows = np.concatenate((np.arange(len(twin)), np.flatnonzero(twin)))
+    interval = joined.interval[rows]
+    interval[len(twin) :] = 0
+    return _Pieces(
+        interval,
+        joined.centre[rows],
+        joined.half[rows],
+        joined.epidermis[rows],
+        joined.fracture[rows],
     )
-    return _Pieces(*(np.concatenate(both) for both in zip(joined, again, strict=True)))
 
 
 def _neighbouring(nodes: _Nodes, link: _Indices, step: int, n: int, cyclic: bool) -> _Indices:
@@ -246,9 +252,7 @@ def _neighbouring(nodes: _Nodes, link: _Indices, step: int, n: int, cyclic: bool
     return np.where(fits, link, -1)
 
 
-def _join_heads(
-    nodes: _Nodes, upward: _Indices, downward: _Indices, n: int, cyclic: bool
-) -> None:
+def _join_heads(nodes: _Nodes, upward: _Indices, downward: _Indices, n: int, cyclic: bool) -> None:
     """Link upper ends to lower ends that face them from the strip above, each to the nearest."""
     tops, bottoms = np.flatnonzero(upward < 0), np.flatnonzero(downward < 0)
     facing = nodes.strip[tops] + 1
@@ -327,7 +331,9 @@ def _between(
     return _Pieces(
         interval,
         np.column_stack((nodes.centre[low], far, slope[low] * height, slope[high] * height)),
-        np.column_stack((nodes.half[low], nodes.half[high], swell[low] * height, swell[high] * height)),
+        np.column_stack(
+            (nodes.half[low], nodes.half[high], swell[low] * height, swell[high] * height)
+        ),
         np.column_stack((nodes.epidermis[low], torn)),
         nodes.fracture[low],
     )

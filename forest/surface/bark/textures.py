@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError
-from forest.surface.bark.growing import grow_bark
+from forest.surface.bark.growing import Bark, grow_bark
 from forest.surface.bark.material import Material
 from forest.surface.bark.noise import draws, flakes, noise
 from forest.surface.bark.outlines import Relief, fields, profile_of, rows_of
@@ -226,7 +226,7 @@ def grow_tile(
     strips: int,
     seed: int,
     steps: int = _STEPS,
-) -> Any:
+) -> Bark:
     """Grow bark that continues over its upper and lower end as it does around (section 4).
 
     Parameters

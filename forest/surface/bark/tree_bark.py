@@ -85,9 +85,7 @@ class _Stretch:
         """Grow bark up to a row of the history."""
         rows = self.before + row + 1
         spread = None if self.spread is None else self.spread[: rows - 1]
-        bark = grow_bark(
-            tree.geometry, self.first[:rows], material, seed, dilatation=spread
-        )
+        bark = grow_bark(tree.geometry, self.first[:rows], material, seed, dilatation=spread)
         if self.again is None:
             return bark
         # Plates tear where the first fractures lie at the end, so that none of them moves.
@@ -156,7 +154,9 @@ class TreeBark:
         """Give the same bark at an earlier time: cracks of it are there later, and wider."""
         history = self.history.upto(time)
         row = len(history.times) - 1
-        return _grown(self.tree, self.preset, self.seed, history, self._stretch, self._material, row)
+        return _grown(
+            self.tree, self.preset, self.seed, history, self._stretch, self._material, row
+        )
 
     def piece(self, axis: int = 0, low_m: float | None = None, high_m: float | None = None) -> Bark:
         """Give the bark of a part of an axis, from `low_m` to `high_m` along it.
@@ -301,9 +301,7 @@ def bark_tree(
     """
     if law not in LAWS:
         raise InputError(f"law '{law}'", where="bark", expected=" or ".join(LAWS))
-    tree = lay_strips(
-        skeleton, strip_m or preset.tearing.strip_m, least_radius_m=least_radius_m
-    )
+    tree = lay_strips(skeleton, strip_m or preset.tearing.strip_m, least_radius_m=least_radius_m)
     girth = present_girths(tree)
     if shrink:
         steps = np.arange(_STEPS + 1.0)
@@ -334,5 +332,3 @@ def _grown(
     now = history.girth[-1]
     sized = rescaled(bark, np.where(np.isnan(now), bark.strips.girth, now))
     return TreeBark(tree, sized, preset, seed, history, stretch, material)
-
-
