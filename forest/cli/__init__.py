@@ -20,6 +20,7 @@ from forest.cli.measuring import bucking, measure
 from forest.cli.planting import tree
 from forest.cli.reading import info, landscape, picture, stability, table
 from forest.cli.ringing import rings
+from forest.cli.scenery import scene
 from forest.cli.shared import Stopped
 from forest.cli.surfacing import mesh
 from forest.cli.viewing import stand_view
@@ -59,6 +60,7 @@ for _command in (
     species,
     picture,
     stand_view,
+    scene,
     tree,
     version,
 ):

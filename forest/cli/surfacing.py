@@ -13,9 +13,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from forest.surface.export import Part
+    from forest.surface.mesh import Mesh
+    from forest.trees.skeleton import Skeleton
 
 #: Formats of meshes that commands write.
 MESH = (".glb", ".obj", ".ply", ".vtp")
+_KINDS = ("blended", "tubes")
 
 
 def mesh(
@@ -27,8 +30,15 @@ def mesh(
     year: Annotated[
         int | None, typer.Option(help="Default: the last in which it is on record.")
     ] = None,
+    kind: Annotated[
+        str, typer.Option(help="blended: one surface; tubes: one for each axis, fast.")
+    ] = "blended",
+    cell: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Smallest cell of a blended surface; default: by size."),
+    ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="M", help="How far tubes may be off round and straight.")
+        float, typer.Option(metavar="M", help="How far tubes may be off round.")
     ] = 0.001,
     leaves: Annotated[
         bool | None,
@@ -48,23 +58,27 @@ def mesh(
 
         forest mesh run.h5 --tree 12 --to tree.glb
 
-        forest mesh run.h5 --tree 12 --year 2040 --to wood.ply
+        forest mesh run.h5 --tree 12 --year 2040 --to wood.ply --cell 0.01
+
+        forest mesh run.h5 --tree 12 --to fast.glb --kind tubes
 
         forest mesh run.h5 --tree 12 --to orders.png --colour order
     """
+    from forest.errors import InputError, nearest
     from forest.record.run import open_run
-    from forest.surface.tubes import tubes
     from forest.trees.leaves import leaves_of
     from forest.view.tree_mesh import species_of, tree_parts, with_leaves
 
     check_targets((to, (*MESH, ".png")), force=force)
+    if kind not in _KINDS:
+        raise InputError(f"unknown kind '{kind}', {nearest(kind, _KINDS)}")
     with open_run(run_file) as run:
         check_sample(run, tree)
         at = int(run.sample_years(tree)[-1]) if year is None else year
         skeleton = run.skeleton(tree, at)
         species = species_of(run, skeleton)
     with working(f"the surface of {len(skeleton):,} internodes"):
-        wood = tubes(skeleton, tolerance_m=tolerance)
+        wood = _surface(skeleton, kind, cell, tolerance)
         cards = leaves_of(skeleton, species) if with_leaves(to, leaves) else None
         parts = tree_parts(wood, skeleton, cards)
     write_parts(parts, to, colour, force)
@@ -90,6 +104,16 @@ def working(what: str) -> Any:
     from rich.console import Console
 
     return Console(stderr=True).status(what)
+
+
+def _surface(skeleton: Skeleton, kind: str, cell: float | None, tolerance: float) -> Mesh:
+    if kind == "tubes":
+        from forest.surface.tubes import tubes
+
+        return tubes(skeleton, tolerance_m=tolerance)
+    from forest.surface.blend import blended
+
+    return blended(skeleton, cell_m=cell)
 
 
 def check_sample(run: Any, tree: int) -> None:

@@ -81,7 +81,7 @@ def stand_view(
     is_run = scene.suffix.lower() in (".h5", ".hdf5")
     if not is_run and (year is not None or tile != 1):
         raise InputError("--year and --tile are for run files", where=str(scene))
-    scenery = _of_run(scene, year, tile) if is_run else _of_file(scene)
+    scenery = scenery_of_path(scene, year, tile) if is_run else _of_file(scene)
     scenery = _changed(scenery, season, quality, sun, haze, size)
     scenery = _seen_from(scenery, eye, towards, field_of_view)
     for note in scenery.notes:
@@ -103,7 +103,7 @@ def _of_file(scene: Path) -> Scenery:
     return load_scenery(scene)
 
 
-def _of_run(path: Path, year: int | None, tile: int) -> Scenery:
+def scenery_of_path(path: Path, year: int | None, tile: int) -> Scenery:
     """Read a year of a run, with the shapes of the checkpoint that is nearest to it."""
     from dataclasses import replace
 

@@ -89,6 +89,8 @@ class Description:
         Trunk, main branches and all other branches, in order of creation.
     leaves : Leaves
         In order of creation.
+    skeleton : Skeleton
+        The tree that it was made of.
     lobes : (int, float)
         Number of peaks around the trunk, and their height as a share of its radius.
     lobed_levels : int
@@ -97,6 +99,7 @@ class Description:
 
     stems: tuple[Segments, ...]
     leaves: Leaves
+    skeleton: Skeleton
     lobes: tuple[int, float] = (0, 0.0)
     lobed_levels: int = 1
 
@@ -178,7 +181,7 @@ def describe(
     stems = tuple(
         Segments(*(field[by_axis[level == k]] for field in whole)) for k in range(LAST_LEVEL + 1)
     )
-    return Description(stems, leaves, lobes, lobed_levels)
+    return Description(stems, leaves, skeleton, lobes, lobed_levels)
 
 
 def _tubes(

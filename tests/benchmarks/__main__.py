@@ -30,6 +30,7 @@ from tests.benchmarks import (
     parametric,
     report,
     runs,
+    scenes,
     stands,
     surfaces,
 )
@@ -49,11 +50,18 @@ class Extent(NamedTuple):
     bending: tuple[int, int]  # tiles along each edge and rounds of the stand that bends
     run: tuple[str, ...]  # changes to the hectare
     frame_trees: int  # of the stand view
+    scene_across: int  # tiles along each edge of the scene
     repeats: int  # of the paper's tree and of the warm start
 
 
 FULL = Extent(
-    across=(2, 5, 17), rounds=(9, 5, 3), bending=(5, 3), run=(), frame_trees=10_000, repeats=3
+    across=(2, 5, 17),
+    rounds=(9, 5, 3),
+    bending=(5, 3),
+    run=(),
+    frame_trees=10_000,
+    scene_across=8,
+    repeats=3,
 )
 QUICK = Extent(
     across=(1, 3),
@@ -61,6 +69,7 @@ QUICK = Extent(
     bending=(3, 3),
     run=("plot.size_m=[24, 24]", "years=30"),
     frame_trees=2_000,
+    scene_across=3,
     repeats=1,
 )
 
@@ -76,6 +85,9 @@ def measure(extent: Extent) -> dict[str, Any]:
             _say(f"{n} x {n} tiles", machine.alone, costs.measure_stand, tile, n, rounds)
             for n, rounds in zip(extent.across, extent.rounds, strict=True)
         ]
+        result["scene"] = _say(
+            "a scene", machine.alone, scenes.measure_scene, tile, extent.scene_across
+        )
         _say("growing a tile that bends", machine.alone, stands.keep_tile, tile, "mechanics={}")
         result["bending"] = _say(
             "mechanics", machine.alone, bending.measure_bending, tile, *extent.bending

@@ -143,25 +143,19 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(f"a thousand parametric aspens, {threads} threads, s", (whole,))
     yield Line("an aspen's moment of wind, ms", (f"{1e3 * forms['sway_s']:.1f}",))
     yield from _frame_lines(result["frames"])
-<<<<<<< HEAD
-<<<<<<< HEAD
-=======
->>>>>>> 952e87b678378d450d58cfdaaf6985e2a8d09a8f
+    yield from _scene_lines(result["scene"])
     skin = result["surfaces"]
     yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
-<<<<<<< HEAD
-=======
-    yield from _bark_lines(result["bark"])
->>>>>>> cab0d683de733c39e926790db334a5e580d023c0
-=======
+    whole = f"blended, cells of 1 cm, {skin['blended_triangles']:,} triangles, s"
+    yield Line(whole, (f"{skin['blended_s']:.1f}", f"{skin['blended_cpu_s']:.1f}"))
+    yield Line("most memory held, GiB", (f"{skin['blended_gib']:.1f}",))
     yield from _bark_lines(result["bark"])
     maps = result["bark_maps"]
     yield Line(f"Maps of a trunk, {maps['size']} x {maps['size']}", ())
     for key, what in (("maps", "4K set: textures, maps, s"), ("save", "4K set: its PNGs, s")):
         yield Line(what, (f"{maps[key + '_s']:.1f}", f"{maps[key + '_cpu_s']:.1f}"))
->>>>>>> 952e87b678378d450d58cfdaaf6985e2a8d09a8f
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
@@ -196,6 +190,13 @@ def _bark_lines(cases: dict[str, Any]) -> Iterator[Line]:
         if name != "paper_s":
             what = f"{name}, {case['elements']:,} elements, s"
             yield Line(what, (f"{case['wall_s']:.2f}", f"{case['cpu_s']:.2f}"))
+
+
+def _scene_lines(scene: dict[str, Any]) -> Iterator[Line]:
+    what = f"{scene['trees']:,} trees of {scene['shapes']} shapes on {scene['hectares']:.2f} ha"
+    yield Line(f"A scene at stand detail: {what}, a .glb of {scene['megabytes']:.0f} MB", ())
+    yield Line("meshes and file, s", (f"{scene['seconds']:.3g}", f"{scene['cpu_s']:.3g}"))
+    yield Line("peak memory, GB", (f"{scene['peak_gb']:.2f}",))
 
 
 def show(result: dict[str, Any]) -> None:

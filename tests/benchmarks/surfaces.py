@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import resource
 import statistics
 import time
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from forest.surface.blend import CrossingWarning, blended
 from forest.surface.tubes import tubes
 from forest.trees.skeleton import Skeleton, number_axes
 
 _METAMERS = 50_000
+_CELL_M = 0.01
 
 
 def grown(metamers: int = _METAMERS) -> Skeleton:
@@ -64,16 +68,25 @@ def measure_surfaces(repeats: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        Internodes; wall and processor seconds of its tubes, and their triangles.
+        Internodes; wall and processor seconds of its tubes and of its blended surface with cells of
+        1 cm, their triangles, and the most memory that the process held, GiB.
     """
     tree = grown()
     mesh = tubes(tree)
     wall, cpu = _time(lambda: tubes(tree), 3 * repeats)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CrossingWarning)  # its limbs grow at random
+        whole = blended(tree, cell_m=_CELL_M)
+        blended_wall, blended_cpu = _time(lambda: blended(tree, cell_m=_CELL_M), repeats)
     return {
         "metamers": len(tree),
         "tubes_s": wall,
         "tubes_cpu_s": cpu,
         "tube_triangles": len(mesh.triangles),
+        "blended_s": blended_wall,
+        "blended_cpu_s": blended_cpu,
+        "blended_triangles": len(whole.triangles),
+        "blended_gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
     }
 
 

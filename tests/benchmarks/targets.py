@@ -10,6 +10,7 @@ from tests.benchmarks.runs import PAPER_INTERNODES
 #: A stand of at least so many metamers with a living site is held to the cost of a large one.
 _LARGE = 5_000_000
 _FRAME_TREES = 10_000
+_SCENE_HECTARES = 0.9  # a scene of so many is held to the time of one
 _HECTARE = {"plot_m": 100.0, "years": 100}
 
 
@@ -54,12 +55,17 @@ def verdicts(result: dict[str, Any]) -> Iterator[Verdict]:
     yield Verdict("the same, aim", timed["bend_ns"] / 1e3, "≤", 0.6)
     changed = timed["again_ns"] / timed["wall_ns"]["settle"]
     yield Verdict("settling where nothing has changed, of a year's", changed, "≤", 0.5)
+    scene = result["scene"]
+    if scene["hectares"] >= _SCENE_HECTARES:
+        yield Verdict("scene of a hectare, s", scene["seconds"], "≤", 20.0)
     frames = result["frames"]
     if frames["trees"] >= _FRAME_TREES:
         frame = frames["threads"][max(frames["threads"])]
         yield Verdict("a frame of 10,000 trees, s", frame["shaded_s"], "≤", 2.0)
     surfaces = result["surfaces"]
     yield Verdict("tubes of 50,000 internodes, s", surfaces["tubes_s"], "≤", 1.0)
+    yield Verdict("its blended surface, s", surfaces["blended_s"], "≤", 60.0)
+    yield Verdict("its blended surface, GiB", surfaces["blended_gib"], "≤", 4.0)
     maps = result["bark_maps"]
     yield Verdict("4K set of a trunk, s", maps["maps_s"] + maps["save_s"], "≤", 10.0)
     yield Verdict("bark of 225 strips, s", result["bark"]["225 strips"]["wall_s"], "≤", 2.0)

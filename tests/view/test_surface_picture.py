@@ -70,10 +70,14 @@ def test_the_command_writes_a_sample_tree(run_file: Path, tmp_path: Path, suffix
     ("words", "said"),
     [
         (("--tree", "9999", "--to", "x.glb"), "tree 9999 is no sample tree; expected one of its"),
+        (("--tree", "1", "--to", "x.glb", "--kind", "tube"), "did you mean 'tubes'?"),
         (("--tree", "1", "--to", "x.stl"), "unknown format '.stl'"),
         (("--tree", "1", "--to", "x.glb", "--year", "1900"), "not on record in 1900"),
         (("--tree", "1", "--to", "x.png", "--colour", "radius"), "did you mean 'radius_m'?"),
-        (("--tree", "1", "--to", "x.glb", "--tolerance", "-1"), "tolerance_m is -1"),
+        (
+            ("--tree", "1", "--to", "x.glb", "--kind", "tubes", "--tolerance", "-1"),
+            "tolerance_m is -1",
+        ),
     ],
 )
 def test_the_command_refuses(

@@ -28,10 +28,8 @@ SHORTEST = 1e-9
 SAME_BASE = 0.25
 #: Most limbs that share a joint, without their parent.
 MOST_SIBLINGS = 8
-#: How far from a joint its blend reaches, times the distance at which the plain cones part.
-REACH = 2.0
 #: The sine of half the angle between two limbs is taken as at least this.
-_NARROWEST = 0.1
+_NARROWEST = 0.15
 #: Columns of `Cones.flare`: height and widening of the foot (m), lobes, their depth and phase.
 FLARE = 5
 
@@ -397,24 +395,24 @@ def _joints(skeleton: Skeleton, cones: Cones, chains: list[_Ints], first: _Ints)
         for together in _places(bases):
             for base in together:
                 thick, thin = sorted((base.parent_radius, base.radius), reverse=True)
-                reach = _reach(cones, first, base.child, base.parent, base.point, thick)
+                reach = _reach(cones, first, base.child, base.parent, base.point, thick, thin)
                 rows.append((base.point, reach, thin, base.parent, base.child))
             for k, one in enumerate(together):
                 for other in together[k + 1 :]:
                     thick, thin = sorted((one.radius, other.radius), reverse=True)
-                    reach = _reach(cones, first, one.child, other.child, one.point, thick)
+                    reach = _reach(cones, first, one.child, other.child, one.point, thick, thin)
                     rows.append((one.point, reach, thin, one.child, other.child))
             place.append(len(rows))
     n = len(rows)
     point = np.array([row[0] for row in rows]).reshape(n, 3)
-    reach = np.array([row[1] for row in rows])
+    reaches = np.array([row[1] for row in rows])
     lower, upper = np.zeros((n, 2), np.int64), np.zeros((n, 2), np.int64)
     for j, row in enumerate(rows):
-        for k in range(2):
-            lower[j, k], upper[j, k] = _within(cones, first, row[3 + k], point[j], reach[j])
+        for k, axis in enumerate(row[3:]):
+            lower[j, k], upper[j, k] = _within(cones, first, int(axis), point[j], float(reaches[j]))
     return Joints(
         point=point,
-        reach=reach,
+        reach=reaches,
         thin=np.array([row[2] for row in rows]),
         first=lower,
         last=upper,
@@ -423,14 +421,23 @@ def _joints(skeleton: Skeleton, cones: Cones, chains: list[_Ints], first: _Ints)
 
 
 def _reach(
-    cones: Cones, first: _Ints, one: int, other: int, point: _Floats, radius: float
+    cones: Cones,
+    first: _Ints,
+    one: int,
+    other: int,
+    point: _Floats,
+    thick: float,
+    thin: float,
 ) -> float:
-    """How far the blend of two limbs reaches: in proportion to where plain cones part."""
-    a = _headings(cones, first, one, point, 0.5 * radius)
-    b = _headings(cones, first, other, point, 0.5 * radius)
+    """How far the blend of two limbs reaches: (R + r) / sin(half the angle between them).
+
+    For equal limbs this is twice the distance at which the plain ones part.
+    """
+    a = _headings(cones, first, one, point, 0.5 * thick)
+    b = _headings(cones, first, other, point, 0.5 * thick)
     closest = float(np.max(a @ b.T)) if len(a) and len(b) else 0.0
     half = np.sqrt(max(0.5 * (1.0 - closest), 0.0))
-    return REACH * radius / max(float(half), _NARROWEST)
+    return (thick + thin) / max(float(half), _NARROWEST)
 
 
 def _within(cones: Cones, first: _Ints, axis: int, point: _Floats, reach: float) -> tuple[int, int]:

@@ -56,6 +56,7 @@ def cone(cones: Any, i: Any, x: Any, y: Any, z: Any) -> Any:
     lx, ly, lz = cones.end[i, 0] - ax, cones.end[i, 1] - ay, cones.end[i, 2] - az
     square = lx * lx + ly * ly + lz * lz
     t = ((x - ax) * lx + (y - ay) * ly + (z - az) * lz) / square
+    behind = -t * np.sqrt(square)
     t = min(max(t, 0.0), 1.0)
     fx, fy, fz = ax + t * lx, ay + t * ly, az + t * lz
     dx, dy, dz = x - fx, y - fy, z - fz
@@ -67,17 +68,27 @@ def cone(cones: Any, i: Any, x: Any, y: Any, z: Any) -> Any:
         lean = dx * cones.side[i, 0] + dy * cones.side[i, 1] + dz * cones.side[i, 2]
         lean = lean / d if d > _TINY else 0.0
         wide = cones.widened[axis] * fall_off(along / cones.reach[axis])
+        if behind > 0.0:  # within its parent: not through that one's far side
+            wide *= fall_off(behind / cones.low[i])
         r += 0.5 * wide * (1.0 + lean)
+    ground = cones.ground[axis] - max(along - 2.0 * r, 0.0)  # a stem that lies is not cut in two
     if along < cones.flare[axis, 0]:
-        r += _flare(cones.flare[axis], along, dx, dy)
-    return max(d - r, cones.ground[axis] - z), r, fx, fy, fz, t
+        size = np.sqrt(square)
+        r += _flare(cones.flare[axis], along, lx / size, ly / size, lz / size, dx, dy, dz)
+    return max(d - r, ground - z), r, fx, fy, fz, t
 
 
 @njit
-def _flare(flare: Any, along: Any, dx: Any, dy: Any) -> Any:
-    """How much the foot is widened there: towards the ground, and more in its lobes, m."""
+def _flare(flare: Any, along: Any, hx: Any, hy: Any, hz: Any, dx: Any, dy: Any, dz: Any) -> Any:
+    """How much the foot is widened there: towards the ground, and more in its lobes, m.
+
+    The azimuth is that after the shortest turn that sets the stem, of direction h, upright.
+    """
     rise = 1.0 - along / flare[0]
-    lobed = 0.5 * (1.0 + np.cos(flare[2] * np.arctan2(dy, dx) + flare[4]))
+    k = 1.0 / (1.0 + hz)
+    x = (1.0 - hx * hx * k) * dx - hx * hy * k * dy - hx * dz
+    y = -hx * hy * k * dx + (1.0 - hy * hy * k) * dy - hy * dz
+    lobed = 0.5 * (1.0 + np.cos(flare[2] * np.arctan2(y, x) + flare[4]))
     return flare[1] * rise * rise * rise * (1.0 - flare[3] * (1.0 - lobed))
 
 
@@ -203,7 +214,7 @@ def _blend(field: Any, plain: Any, x: Any, y: Any, z: Any) -> Any:
             best = min(best, here)
         node = past(node)
     if field.printed[0]:
-        return plain + moved / max(total, 1.0)
+        return plain + moved / total if total > 0.0 else plain
     return best
 
 

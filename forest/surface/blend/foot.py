@@ -13,6 +13,7 @@ from forest.trees.skeleton import Skeleton
 
 #: Thinner stems have no root flare unless told: radius at the ground, m.
 THINNEST_FLARED_M = 0.05
+_STEEP = 0.7  # cosine to the vertical; what lies down has no flare
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,11 @@ class Flare:
                 )
 
     def columns(self, skeleton: Skeleton) -> NDArray[np.float64]:
-        """Give the flare of each axis, float64 (axes, FLARE): that of axes from the ground."""
+        """Give the flare of each axis, float64 (axes, FLARE): of axes that rise from the ground."""
         found = np.zeros((int(skeleton.axis.max()) + 1, FLARE))
-        for i in np.flatnonzero(skeleton.parent < 0):
+        way = skeleton.end - skeleton.start
+        rises = way[:, 2] > _STEEP * np.linalg.norm(way, axis=1)
+        for i in np.flatnonzero((skeleton.parent < 0) & rises):
             r = float(skeleton.radius[i])
             phase = -self.lobes * np.deg2rad(self.azimuth_deg)
             found[skeleton.axis[i]] = (

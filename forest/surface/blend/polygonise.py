@@ -259,14 +259,14 @@ def march(
     edges = np.empty((int(_march(members, _FACES, inside, none, False)), 3), np.int64)
     _march(members, _FACES, inside, edges, True)
     del members
-    names, triangles = np.unique(edges, return_inverse=True)
+    names, corners = np.unique(edges, return_inverse=True)
     del edges
     a, b = names // len(places), names % len(places)
     t = np.clip(f[a] / (f[a] - f[b]), _END, 1.0 - _END)[:, None]
     points = (1.0 - t) * places[a] + t * places[b]
     most = 0.5 * np.linalg.norm(places[a] - places[b], axis=1)
     hints = hints[a]
-    triangles = triangles.reshape(-1, 3).astype(np.int32)
+    triangles: NDArray[np.int32] = corners.reshape(-1, 3).astype(np.int32)
     return _even(blend, points, triangles, most, hints), triangles
 
 

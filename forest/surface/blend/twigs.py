@@ -65,9 +65,9 @@ def _lines(skeleton: Skeleton, kept: NDArray[np.bool_]) -> Lines:
     point = np.insert(skeleton.end[members], head, skeleton.start[base], axis=0)
     internode = np.insert(members, head, base)
     radius = skeleton.radius[internode]
-    inner = np.ones(len(internode), np.bool_)
-    inner[first[:-1]] = inner[first[1:] - 1] = False
-    inner = np.flatnonzero(inner)
+    between = np.ones(len(internode), np.bool_)
+    between[first[:-1]] = between[first[1:] - 1] = False
+    inner = np.flatnonzero(between)
     radius[inner] = 0.5 * (
         skeleton.radius[internode[inner]] + skeleton.radius[internode[inner + 1]]
     )

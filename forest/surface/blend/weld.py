@@ -58,15 +58,15 @@ def _grow_patch(body: Any, beyond: Any, seed: Any, axis: Any, at: Any, radius: A
                 ) -> Any:  # fmt: skip
     """Grow a disk of triangles around a twig's exit; gives how many are in it."""
     patch[0] = seed
-    n = 1
-    k = 0
+    n = np.int64(1)
+    k = np.int64(0)
     while k < n and n < len(patch):
         for e in range(3):
             t = beyond[patch[k], e]
             if body.dead[t] or body.owner[t] != BLENDED:
                 continue
             known = False
-            shared = 0
+            shared = np.int64(0)
             for i in range(n):
                 known = known or patch[i] == t
             if known:
@@ -162,16 +162,18 @@ def _strip(body: Any, twigs: Any, q: Any, loop: Any, m: Any, base: Any) -> None:
     turn = np.empty(m + 1)  # of the rim around the twig's axis, without jumps
     lift = np.empty(m + 1)
     turn[0] = _angle(twigs, ring, body.point[loop[0]])
-    for i in range(m + 1):
-        p = body.point[loop[i % m]]
-        lift[i] = np.sum((p - twigs.centre[ring]) * heading)
-        if i > 0:
-            change = _angle(twigs, ring, p) - turn[i - 1]
-            turn[i] = turn[i - 1] + change - 2.0 * np.pi * np.round(change / (2.0 * np.pi))
+    for k in range(m + 1):
+        p = body.point[loop[k % m]]
+        lift[k] = np.sum((p - twigs.centre[ring]) * heading)
+        if k > 0:
+            change = _angle(twigs, ring, p) - turn[k - 1]
+            turn[k] = turn[k - 1] + change - 2.0 * np.pi * np.round(change / (2.0 * np.pi))
     first = np.int64(np.round(turn[0] / step))
-    i, j, run = np.int64(0), np.int64(0), np.int64(0)
+    i: Any = np.int64(0)
+    j: Any = np.int64(0)
+    run: Any = np.int64(0)
     while i < m or j < n:
-        on_rim = j == n
+        on_rim: Any = j == n
         if i < m and j < n:
             p, r = body.point[loop[i]], body.point[base + (first + j) % n]
             ahead = body.point[loop[(i + 1) % m]] - r
@@ -303,7 +305,8 @@ def _pierce(body: Any, t: Any, p: Any, radius: Any, head: Any, loop: Any, weight
 @njit
 def _nearest_left(body: Any, first: Any, last: Any, left: Any, p: Any, weight: Any) -> Any:
     """Find the triangle of a host nearest to a point; -1 where it has none."""
-    best, seed = np.inf, np.int64(-1)
+    best: Any = np.inf
+    seed: Any = np.int64(-1)
     for t in range(first, last):
         if not body.dead[t]:
             away = _foot(body, t, p, weight)

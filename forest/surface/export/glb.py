@@ -48,13 +48,13 @@ def write_glb(parts: Sequence[Part], draft: Path) -> None:
     integers of 32 bits there; those that are 0 everywhere are left out. Points are doubled at
     seams of the texture coordinates.
     """
-    file = _File()
+    file = GltfFile()
     for part in parts:
         file.add(part)
     file.save(draft)
 
 
-class _File:
+class GltfFile:
     """A glTF file in the making."""
 
     def __init__(self) -> None:

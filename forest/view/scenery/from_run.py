@@ -15,6 +15,7 @@ from forest.residual import GrownResidual, grow_residual
 from forest.species import Species
 from forest.surface.grass import GRASSES
 from forest.surface.instances import Instances, Model
+from forest.surface.scene import Census
 from forest.surface.terrain import HeightField
 from forest.trees.leaves import Leaves, leaves_of
 from forest.trees.skeleton import Skeleton
@@ -24,6 +25,9 @@ from forest.view.scenery.scenery import Scenery
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from forest.scenario import Scenario
+    from forest.stand import Stand
 
 #: Parametric species that stand in for simulated ones of which no shape is on record.
 STAND_INS: Mapping[str, str] = {
@@ -114,14 +118,60 @@ def scenery_of_run(
         `MOST_TILED` trees with all repeats.
     """
     year = _year(run, year)
-    columns = ["tree_id", "species", "x_m", "y_m", "height_m", "status"]
+    columns = ["tree_id", "species", "x_m", "y_m", "height_m", "dbh_cm", "status"]
     trees = run.read("trees", columns, years=(year, year))
-    trees = trees[(trees["status"] == "living") & (trees["height_m"] > 0.0)]
+    found = _found(run, year, shapes, year if shapes_year is None else shapes_year)
+    return _put_up(
+        _Standing(
+            run.scenario,
+            year,
+            trees[(trees["status"] == "living") & (trees["height_m"] > 0.0)],
+            _residual_rows(run, year),
+            *found,
+        ),
+        tile=tile,
+        grass=grass,
+    )
+
+
+def scenery_of_stand(stand: Stand, *, tile: int = 1, grass: str | None = "meadow") -> Scenery:
+    """Put up the trees of a stand as it stands, like `scenery_of_run` those of a year."""
+    found = {int(tree_id): stand.skeleton(int(tree_id)) for tree_id in stand.rows.tree_id}
+    trees = stand.trees
+    return _put_up(
+        _Standing(
+            stand.scenario,
+            stand.year,
+            trees[trees["height_m"] > 0.0],
+            stand.residual.table,
+            found,
+            dict.fromkeys(found, stand.year),
+            set(),
+        ),
+        tile=tile,
+        grass=grass,
+    )
+
+
+class _Standing(NamedTuple):
+    """What stands in a year: rows of the trees, and of what skeletons there are the years."""
+
+    scenario: Scenario
+    year: int
+    trees: pd.DataFrame
+    residual: pd.DataFrame
+    found: dict[int, Skeleton]
+    years: dict[int, int]
+    samples: set[int]  # all of these become models
+
+
+def _put_up(standing: _Standing, *, tile: int, grass: str | None) -> Scenery:
+    """Give every tree a model: its own, one of its species, or a stand-in."""
+    scenario, year, trees = standing.scenario, standing.year, standing.trees
+    residual = standing.residual
     stock = Stock()
     _check_tile(len(trees), tile)
-    known = _shapes_on_record(
-        run, year, shapes, year if shapes_year is None else shapes_year, stock
-    )
+    known = _shapes_on_record(standing, stock)
     names = trees["species"].astype(str).to_numpy()
     ids, heights = trees["tree_id"].to_numpy(), trees["height_m"].to_numpy(np.float64)
     model = np.zeros(len(trees), np.int64)
@@ -136,16 +186,15 @@ def scenery_of_run(
                 lent.add(best.year)
         else:
             seed = int(ids[k]) % _STAND_IN_SEEDS
-            model[k] = _stand_in(name, seed, run.scenario.species[name].group, stock)
+            model[k] = _stand_in(name, seed, scenario.species[name].group, stock)
             stand_in += 1
-    model_of_residual, residual = _residual(run, year, stock)
-    model = np.concatenate((model, model_of_residual))
+    model = np.concatenate((model, _residual_models(scenario, residual, stock)))
     heights = np.concatenate((heights, residual["height_m"].to_numpy(np.float64)))
     as_it_is = np.concatenate((as_it_is, np.ones(len(residual), np.bool_)))
     spots = np.concatenate([t[["x_m", "y_m"]].to_numpy(np.float64) for t in (trees, residual)])
     sizes = np.array(stock.heights)
     scale = np.where(as_it_is, 1.0, heights / sizes[model]) if len(model) else np.empty(0)
-    width, depth = run.scenario.plot.size_m
+    width, depth = scenario.plot.size_m
     shift = (np.arange(tile) - tile // 2).astype(np.float64)
     places = [
         np.column_stack((spots[:, 0] + i * width, spots[:, 1] + j * depth, np.zeros(len(spots))))
@@ -165,6 +214,7 @@ def scenery_of_run(
         grasses={1: GRASSES[grass]} if grass else {},
         grass_at=_grass_around(extent),
         ground=_LITTER,
+        census=_census(scenario, trees, residual, tile),
         notes=_told(year, as_it_is[: len(names)], stand_in, lent, tile),
     )
 
@@ -214,10 +264,10 @@ def _year(run: Run, year: int | None) -> int:
     return year
 
 
-def _shapes_on_record(
-    run: Run, year: int, shapes: Iterable[Skeleton], shapes_year: int, stock: Stock
-) -> dict[str, list[_Shape]]:
-    """Make models of the shapes nearest to that year, for each species evenly over the heights."""
+def _found(
+    run: Run, year: int, shapes: Iterable[Skeleton], shapes_year: int
+) -> tuple[dict[int, Skeleton], dict[int, int], set[int]]:
+    """Take each tree's shape of the year nearest to that one: shapes, years, sample trees."""
     years: dict[int, int] = {}
     for tree_id in run.samples:
         recorded = [int(one) for one in run.sample_years(tree_id)]
@@ -229,17 +279,23 @@ def _shapes_on_record(
         at = years.get(skeleton.tree_id)
         if at is None or abs(shapes_year - year) < abs(at - year):
             found[skeleton.tree_id], years[skeleton.tree_id] = skeleton, shapes_year
+    return found, years, samples
+
+
+def _shapes_on_record(standing: _Standing, stock: Stock) -> dict[str, list[_Shape]]:
+    """Make models of the shapes on record, for each species evenly over the heights."""
+    species, years = standing.scenario.species, standing.years
     by_species: dict[str, list[Skeleton]] = {}
-    for skeleton in sorted(found.values(), key=lambda s: float(s.end[:, 2].max())):
+    for skeleton in sorted(standing.found.values(), key=lambda s: float(s.end[:, 2].max())):
         by_species.setdefault(skeleton.species, []).append(skeleton)
     known: dict[str, list[_Shape]] = {}
     for name, trees in by_species.items():
         even = np.unique(np.linspace(0, len(trees) - 1, MOST_SHAPES).round().astype(int))
-        kept = [s for k, s in enumerate(trees) if k in even or s.tree_id in samples]
+        kept = [s for k, s in enumerate(trees) if k in even or s.tree_id in standing.samples]
         for skeleton in kept:
             number = stock.number(
                 skeleton.tree_id,
-                lambda s=skeleton: simulated_model(s, run.scenario.species),  # type: ignore[misc]
+                lambda s=skeleton: simulated_model(s, species),  # type: ignore[misc]
             )
             known.setdefault(name, []).append(
                 _Shape(stock.heights[number], number, skeleton.tree_id, years[skeleton.tree_id])
@@ -247,18 +303,22 @@ def _shapes_on_record(
     return known
 
 
-def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.DataFrame]:
-    """Give the models of the residual trees that stand in a year, and their rows of `/residual`."""
+def _residual_rows(run: Run, year: int) -> pd.DataFrame:
+    """Read the rows of the residual trees that stand in a year."""
     import pandas as pd
 
     if "residual" not in run.tables:
-        return np.empty(0, np.int64), pd.DataFrame(columns=["x_m", "y_m", "height_m"])
+        return pd.DataFrame(columns=["residual_id", "x_m", "y_m", "height_m", "dbh_cm"])
     rows = run.read("residual", years=(year, year))
-    rows = rows[rows["status"] == "standing"]
+    return rows[rows["status"] == "standing"]
+
+
+def _residual_models(scenario: Scenario, rows: pd.DataFrame, stock: Stock) -> NDArray[np.int64]:
+    """Give the models of residual trees."""
     number = []
     most = min(MOST_RESIDUAL_LEAVES, _ALL_RESIDUAL_LEAVES // max(len(rows), 1))
     for one in rows["residual_id"]:
-        wanted = run.scenario.residual_trees[one - 1]
+        wanted = scenario.residual_trees[one - 1]
         assert wanted.parameters is not None  # filled in when the scenario was read
         tree = grow_residual(wanted, int(one))
         number.append(
@@ -267,7 +327,19 @@ def _residual(run: Run, year: int, stock: Stock) -> tuple[NDArray[np.int64], pd.
                 lambda t=tree, p=wanted.parameters: residual_model(t, p, most),  # type: ignore[misc]
             )
         )
-    return np.array(number, np.int64), rows
+    return np.array(number, np.int64)
+
+
+def _census(scenario: Scenario, trees: pd.DataFrame, residual: pd.DataFrame, tile: int) -> Census:
+    """Tell who the trees are, those of each plot in turn."""
+    ids = [trees["tree_id"], -residual["residual_id"]]
+    of_residual = [scenario.residual_trees[k - 1].species for k in residual["residual_id"]]
+    dbh = [table["dbh_cm"].to_numpy(np.float64) for table in (trees, residual)]
+    return Census(
+        np.tile(np.concatenate(ids).astype(np.int64), tile**2),
+        np.tile(np.array([*trees["species"].astype(str), *of_residual], np.str_), tile**2),
+        np.tile(np.concatenate(dbh), tile**2),
+    )
 
 
 def residual_model(

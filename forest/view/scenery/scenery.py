@@ -13,6 +13,7 @@ from forest.errors import InputError
 from forest.surface.camera import Camera
 from forest.surface.grass import Grass
 from forest.surface.instances import Instances, Model
+from forest.surface.scene import Census
 from forest.surface.terrain import HeightField
 
 RGB = tuple[float, float, float]
@@ -82,6 +83,8 @@ class Scenery:
         The ground that is the scene's own, m; beyond it the ground only goes on.
     sun_azimuth_deg, sun_elevation_deg : float
         From north clockwise, and above the horizon.
+    census : Census, optional
+        Who the trees are, where they have names of their own.
     notes : tuple of str
         What a user should know of how it was made, a line each.
     """
@@ -102,6 +105,7 @@ class Scenery:
     view: Viewpoint = Viewpoint()
     size: tuple[int, int] = (1200, 750)
     seed: int = 1
+    census: Census | None = None
     notes: tuple[str, ...] = ()
     origin_m: tuple[float, float] = (0.0, 0.0)
 
