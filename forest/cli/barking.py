@@ -52,7 +52,7 @@ def bark(
     cell: Annotated[
         float | None, typer.Option(metavar="M", help="In a mesh: bark as geometry, so fine.")
     ] = None,
-    kind: Annotated[str, typer.Option(help="Surface of a mesh: tubes or blended.")] = "tubes",
+    kind: Annotated[str, typer.Option(help="Surface of a mesh: blended, or tubes.")] = "blended",
     film: Annotated[
         str | None, typer.Option(metavar="YEARS", help="In a .png: years, as 1960,1980,2000.")
     ] = None,
@@ -85,7 +85,7 @@ def bark(
 
         forest bark run.h5 --tree 12 --film 1960,1980,2000,2020 --to ages.png
 
-        forest bark run.h5 --tree 12 --kind blended --to tree.glb
+        forest bark run.h5 --tree 12 --kind tubes --to tree.glb
 
         forest bark --parametric quaking_aspen --to aspen.glb
     """

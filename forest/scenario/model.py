@@ -377,9 +377,15 @@ class SampleTrees(Table):
     )
     bark: bool = quantity(
         False,
-        "whether these surfaces have bark that tears as the tree grew, and its maps beside them",
+        "whether these surfaces have bark that tears as the tree grew; needs `meshes`",
         unit="",
     )
+
+    @model_validator(mode="after")
+    def _bark_has_meshes(self) -> SampleTrees:
+        if self.bark and self.meshes is None:
+            raise Refusal("true", key="bark", expected='meshes = "glb" beside it')
+        return self
 
 
 class Output(Table):

@@ -201,7 +201,7 @@ def lay_strips(
     thickest = sorted(paths, key=lambda path: (path.axis != 0, -path.radius[0]))[:most_axes]
     kept = {path.axis for path in thickest}
     paths = [path for path in paths if path.axis in kept]
-    counts = [max(int(round((path.high - path.low) / strip_m)), 4) for path in paths]
+    counts = [max(round((path.high - path.low) / strip_m), 4) for path in paths]
     if sum(counts) > MOST_STRIPS:
         raise InputError(
             f"{sum(counts):,} strips", where="bark", expected=f"{MOST_STRIPS:,}: wider strips"
@@ -265,9 +265,8 @@ def _emerges(path: AxisPath, parent: AxisPath) -> float:
 def _geometry(paths: list[AxisPath], counts: list[int]) -> StripGeometry:
     axis, along, width, factor = [], [], [], []
     for path, count in zip(paths, counts, strict=True):
-        v: _Floats
         step = (path.high - path.low) / count
-        v = path.low + (np.arange(count) + 0.5) * step
+        v = np.asarray(path.low + (np.arange(count) + 0.5) * step, np.float64)
         axis.append(np.full(count, path.axis, np.int32))
         along.append(v)
         width.append(np.full(count, step))

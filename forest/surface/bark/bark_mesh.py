@@ -23,6 +23,7 @@ _Floats = NDArray[np.float64]
 _TILE_PIXELS = 512
 _MOST_PIXELS = 16384
 _LEAST_PIXELS = 16
+_ON_AXIS = 0.01  # radii: nearer to the axis a point has no side
 
 
 def material_of(maps: BarkMaps, name: str, *, bumpy: bool = True) -> Material:
@@ -70,12 +71,14 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
         taken[of] = True
         corners = wood.triangles[of]
         used, place = np.unique(corners, return_inverse=True)
-        v, turn, _ = path.locate(wood.points[used])
-        uv = _corners(turn[place.reshape(-1, 3)], (v[place.reshape(-1, 3)] - low) / (high - low))
+        v, turn, away = path.locate(wood.points[used])
+        turn[away < _ON_AXIS * path.radius_at(v)] = np.nan
+        place = place.reshape(-1, 3)
+        uv = _corners(turn[place], (v[place] - low) / (high - low))
         name = f"bark_{number}"
         mesh = Mesh(
             wood.points[used],
-            place.reshape(-1, 3).astype(np.int32),
+            place.astype(np.int32),
             uv,
             {key: column[used] for key, column in wood.data.items()},
         )
@@ -158,8 +161,14 @@ def _covered(bark: TreeBark, axis: int) -> tuple[float, float]:
 
 
 def _corners(turn: _Floats, share: _Floats) -> _Floats:
-    """Give the uv of triangles: turns of a triangle go the short way around."""
-    turn = turn - np.round(turn - turn[:, :1])
+    """Give the uv of triangles: turns of a triangle go the short way around.
+
+    A corner on the axis itself (NaN), the middle of a cap, lies between the other two.
+    """
+    known = np.argmax(~np.isnan(turn), axis=1)
+    turn = turn - np.round(turn - turn[np.arange(len(turn)), known][:, None])
+    between = np.nanmean(np.where(np.isnan(turn).all(axis=1)[:, None], 0.0, turn), axis=1)
+    turn = np.where(np.isnan(turn), between[:, None], turn)
     return np.stack((turn, share), axis=-1)
 
 
@@ -233,7 +242,7 @@ def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton:
             np.column_stack((np.full(columns, head), top + one, top + two)),
         )
     )
-    turn = np.concatenate((np.tile((one + 0.5) / columns, rings), [0.5, 0.5]))
+    turn = np.concatenate((np.tile((one + 0.5) / columns, rings), [np.nan, np.nan]))
     share = np.concatenate((np.repeat((v - low) / maps.length_m, columns), [0.0, 1.0]))
     row = path.rows[path.internode(np.concatenate((np.repeat(v, columns), v[[0, -1]])))]
     known: dict[str, Any] = {

@@ -21,7 +21,7 @@ def piece_of(bark: Bark, strips: NDArray[np.int64]) -> Bark:
     strips : int64 (k,)
         Rows of `bark.strips`, rising.
     """
-    place = np.full(len(bark.strips.axis), -1, np.int32)
+    place = np.full(len(bark.strips.axis) + 1, -1, np.int32)  # the last for no strip, -1
     place[strips] = np.arange(len(strips), dtype=np.int32)
     first, last = bark.elements.offsets[strips], bark.elements.offsets[strips + 1]
     counts = last - first
@@ -29,31 +29,26 @@ def piece_of(bark: Bark, strips: NDArray[np.int64]) -> Bark:
     rows = np.repeat(first - offsets[:-1], counts) + np.arange(offsets[-1])
     tears = np.unique(bark.elements.tear[rows])
     tears = tears[tears >= 0]
-    number = np.full(len(bark.tears.strip), -1, np.int32)
+    number = np.full(len(bark.tears.strip) + 1, -1, np.int32)  # the last for no tear, -1
     number[tears] = np.arange(len(tears), dtype=np.int32)
     columns: list[Any] = [column[rows] for column in bark.elements[1:]]
     elements = Elements(offsets, *columns)
-    torn = elements.tear >= 0
-    elements = elements._replace(tear=np.where(torn, number[elements.tear], -1).astype(np.int32))
+    elements = elements._replace(tear=number[elements.tear])
     old: list[Any] = [column[tears] for column in bark.tears]
     nodes = bark.tears.__class__(*old)
     nodes = nodes._replace(
         strip=place[nodes.strip],
-        up=np.where(nodes.up >= 0, number[nodes.up], -1).astype(np.int32),
-        down=np.where(nodes.down >= 0, number[nodes.down], -1).astype(np.int32),
+        up=number[nodes.up],
+        down=number[nodes.down],
     )
     kept: list[Any] = [column[strips] for column in bark.strips]
     cut = bark.strips.__class__(*kept)
     cut = cut._replace(
-        neighbour_up=_linked(place, cut.neighbour_up),
-        neighbour_down=_linked(place, cut.neighbour_down),
+        neighbour_up=place[cut.neighbour_up],
+        neighbour_down=place[cut.neighbour_down],
     )
     surface = None if bark.surface is None else piece_of(bark.surface, strips)
     return replace(bark, strips=cut, elements=elements, tears=nodes, surface=surface, history=())
-
-
-def _linked(place: NDArray[np.int32], to: NDArray[np.int32]) -> NDArray[np.int32]:
-    return np.where(to >= 0, place[to], -1).astype(np.int32)
 
 
 def rescaled(bark: Bark, girth: NDArray[np.float64]) -> Bark:
