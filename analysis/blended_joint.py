@@ -51,6 +51,7 @@ def plain(skeleton: Skeleton, cell_m: float) -> Mesh:
         np.zeros((0, 3)),
         np.zeros(0),
         np.zeros(0),
+        np.zeros(0),
         np.zeros((0, 2), np.int64),
         np.zeros((0, 2), np.int64),
         np.zeros(1, np.int64),

@@ -16,15 +16,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-<<<<<<< HEAD
-<<<<<<< HEAD
-=======
->>>>>>> 952e87b678378d450d58cfdaaf6985e2a8d09a8f
 from tests.benchmarks import (
     bark,
     bark_maps,
     bending,
     costs,
+    flow,
     frames,
     machine,
     parametric,
@@ -34,12 +31,6 @@ from tests.benchmarks import (
     stands,
     surfaces,
 )
-<<<<<<< HEAD
-=======
-from tests.benchmarks import bark, bending, costs, frames, machine, parametric, report, runs, stands
->>>>>>> cab0d683de733c39e926790db334a5e580d023c0
-=======
->>>>>>> 952e87b678378d450d58cfdaaf6985e2a8d09a8f
 
 
 class Extent(NamedTuple):
@@ -110,17 +101,10 @@ def measure(extent: Extent) -> dict[str, Any]:
         extent.frame_trees,
         extent.repeats,
     )
-<<<<<<< HEAD
-<<<<<<< HEAD
-    result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
-=======
-    result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
->>>>>>> cab0d683de733c39e926790db334a5e580d023c0
-=======
     result["surfaces"] = _say("surfaces", machine.alone, surfaces.measure_surfaces, extent.repeats)
     result["bark_maps"] = _say("4K set", machine.alone, bark_maps.measure_maps, extent.repeats)
     result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
->>>>>>> 952e87b678378d450d58cfdaaf6985e2a8d09a8f
+    result["flow"] = _say("bark flow", machine.alone, flow.measure_flow, extent.repeats)
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")

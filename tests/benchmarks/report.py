@@ -152,6 +152,7 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(whole, (f"{skin['blended_s']:.1f}", f"{skin['blended_cpu_s']:.1f}"))
     yield Line("most memory held, GiB", (f"{skin['blended_gib']:.1f}",))
     yield from _bark_lines(result["bark"])
+    yield from _flow_lines(result["flow"])
     maps = result["bark_maps"]
     yield Line(f"Maps of a trunk, {maps['size']} x {maps['size']}", ())
     for key, what in (("maps", "4K set: textures, maps, s"), ("save", "4K set: its PNGs, s")):
@@ -182,6 +183,16 @@ def _frame_lines(frames: dict[str, Any]) -> Iterator[Line]:
         ("scene_shadow_s", "once a sun: the scene's shadow map, s"),
     ):
         yield Line(what, (f"{frames[key]:.2f}",))
+
+
+def _flow_lines(found: dict[str, Any]) -> Iterator[Line]:
+    yield Line("Bark flow", ())
+    for key, what in (
+        ("chain", f"a chain past a branching, {found['particle_steps']:,} steps of particles, s"),
+        ("maple", f"maple bark on a metre of trunk, {found['triangles']:,} triangles, s"),
+        ("wound", f"ten years of a wound under {found['covering']:,} particles, s"),
+    ):
+        yield Line(what, tuple(f"{seconds:.2f}" for seconds in found[key]))
 
 
 def _bark_lines(cases: dict[str, Any]) -> Iterator[Line]:

@@ -87,6 +87,10 @@ def value(c: Cones, joints: Joints, x: np.ndarray, paper: bool = False) -> float
             (f1, r1, x1), (f2, r2, x2) = (
                 side(c, joints.first[j, k], joints.last[j, k], _SOFT * thin, x) for k in range(2)
             )
+            if not paper:
+                share *= fade(max(f1, 0.0) / joints.near[j]) * fade(max(f2, 0.0) / joints.near[j])
+            if share <= 0.0:
+                continue
             if paper:
                 moved += share * share * (printed(x, x1, r1, x2, r2) - min(f1, f2))
                 total += share

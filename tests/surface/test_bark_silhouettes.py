@@ -148,3 +148,19 @@ def test_whole_bark_is_one_epidermis() -> None:
     found = fields(silhouettes(bark), plain_relief(4), rows_of(0.5, 4), 32)
     assert (found.fracture == -1).all()
     np.testing.assert_allclose(np.diff(found.epidermis, axis=1), 1 / 32, atol=1e-6)
+
+
+def test_fractures_that_met_head_on_are_one_opening() -> None:
+    bark = tile(11)
+    outlines = silhouettes(bark)
+    names = np.unique(outlines.fracture)
+    assert 0 < len(names) < len(bark.fractures.origin)
+    for k in range(len(outlines.offsets) - 1):
+        rows = slice(outlines.offsets[k], outlines.offsets[k + 1])
+        ends = outlines.half[rows, :2]
+        assert ends.min() >= 0.0
+        assert ends.max(axis=1).min() > 0.0  # no piece is nothing
+    tips = (
+        outlines.half[: outlines.offsets[-2], :2] == 0.0
+    )  # without the interval that is there twice
+    assert tips.sum() < 2 * len(bark.fractures.origin)

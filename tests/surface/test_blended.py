@@ -73,9 +73,9 @@ def test_volume_goes_to_that_of_the_cone() -> None:
 
 def test_joint_has_no_crease() -> None:
     skeleton = branching(55.0)
-    smooth = blended(skeleton, cell_m=0.008, flare=None, cells_in_radius=8.0)
+    smooth = blended(skeleton, cell_m=0.006, flare=None, cells_in_radius=10.0)
     limb = dataclasses.replace(skeleton, parent=np.array([-1, 0, -1], np.int32))
-    plain = blended(limb, cell_m=0.008, flare=None, cells_in_radius=8.0)  # shares no joint
+    plain = blended(limb, cell_m=0.006, flare=None, cells_in_radius=10.0)  # shares no joint
     assert greatest_turn(smooth, 0.8, 1.6) < 30.0
     assert greatest_turn(plain, 0.8, 1.6) > 50.0
 
@@ -167,11 +167,11 @@ def test_what_has_no_surface_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
     with pytest.raises(InputError, match="not a number"):
         blended(dataclasses.replace(whole, end=whole.end * np.nan))
     with pytest.raises(InputError, match="cell_m"):
-        blended(whole, cell_m=0.2)
+        blended(whole, cell_m=0.06)
     with pytest.raises(InputError, match="above 0"):
         blended(whole, cell_m=-1.0)
     with pytest.raises(InputError, match="no internode has a length"):
-        blended(dataclasses.replace(whole, end=whole.start))
+        blended(dataclasses.replace(whole, start=0.0 * whole.start, end=0.0 * whole.end))
     monkeypatch.setattr(cells_module, "free_memory", lambda: 2.0**30)
     with pytest.raises(InputError, match=r"GiB of memory.*cells of about"):
         blended(whole, cell_m=0.0005, cells_in_radius=50.0)

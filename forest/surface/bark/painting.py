@@ -181,7 +181,7 @@ def _paint_row(
             torn = torn * torn * (3.0 - 2.0 * torn)
         for i in range(5):
             skin[i] = 0.0
-        if torn < 1.0:
+        if torn < 1.0 or len(under) > 0:
             if len(under) > 0:
                 sample(under[row : row + 1], e, 0.5, 1.0, skin)
             else:
@@ -196,6 +196,10 @@ def _paint_row(
                 across * surfaces.across[0] + shift, across * surfaces.across[1] + shift,
                 v * surfaces.along[2] + shift, v * surfaces.along[3] + shift, inner,
             )  # fmt: skip
+            if len(under) > 0:  # it lies in the surface of the older bark, and is no brighter
+                inner[_HEIGHT] += skin[_HEIGHT]
+                for i in range(3):
+                    inner[i] = min(inner[i], skin[i])
             for i in range(5):
                 skin[i] += torn * (inner[i] - skin[i])
         turn = (x + 0.5) / n

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from forest._jit import njit
 from forest.errors import InputError
@@ -23,7 +25,7 @@ from forest.surface.bark.growing import Bark
 from forest.surface.bark.strips import FRACTURE
 
 #: Ends face each other when their middles lie within so many of their mean widths.
-_HEAD_ON = 1.5
+_HEAD_ON = 1.0
 
 _Floats = NDArray[np.float64]
 _Indices = NDArray[np.int64]
@@ -46,7 +48,7 @@ class Silhouettes(NamedTuple):
     centre: _Floats  # (pieces, 4) turns
     half: _Floats  # (pieces, 4) half the opening, turns
     epidermis: _Floats  # (pieces, 2) turn on the epidermis where it was torn, below and above
-    fracture: NDArray[np.int32]  # (pieces,) row of `Fractures`
+    fracture: NDArray[np.int32]  # (pieces,) row of `Fractures`: the first of those that are one
     low: float  # the stretch of axis that the strips cover, m
     length: float
     cyclic: bool  # the uppermost strip is followed by the lowest
@@ -217,6 +219,7 @@ def _pieces(nodes: _Nodes, ring: _Ring, knots: _Floats, cyclic: bool) -> _Pieces
     upward = _neighbouring(nodes, nodes.up, 1, n, cyclic)
     downward = _neighbouring(nodes, nodes.down, -1, n, cyclic)
     _join_heads(nodes, upward, downward, n, cyclic)
+    nodes = _as_openings(nodes, *_pairs(nodes, upward, downward))
     slope, swell = _slopes(nodes, upward, downward, knots)
     parts = [_between(nodes, slope, swell, knots, *_pairs(nodes, upward, downward))]
     met_above = np.zeros(len(nodes.strip), np.bool_)
@@ -272,6 +275,16 @@ def _join_heads(nodes: _Nodes, upward: _Indices, downward: _Indices, n: int, cyc
         if upward[i[k]] < 0 and downward[j[k]] < 0:
             upward[i[k]] = j[k]
             downward[j[k]] = i[k]
+
+
+def _as_openings(nodes: _Nodes, low: _Indices, high: _Indices) -> _Nodes:
+    """Give fractures that are one opening one name, the lowest, for what is drawn by name."""
+    n = len(nodes.strip)
+    graph = coo_array((np.ones(len(low), np.bool_), (low, high)), (n, n))
+    count, opening = connected_components(graph, directed=False)
+    name = np.full(count, np.iinfo(np.int32).max, np.int32)
+    np.minimum.at(name, opening, nodes.fracture)
+    return nodes._replace(fracture=name[opening])
 
 
 def _pairs(nodes: _Nodes, upward: _Indices, downward: _Indices) -> tuple[_Indices, _Indices]:

@@ -30,6 +30,8 @@ SAME_BASE = 0.25
 MOST_SIBLINGS = 8
 #: The sine of half the angle between two limbs is taken as at least this.
 _NARROWEST = 0.15
+#: A blend fades within this distance of either limb, times the mean (geometric) of their radii.
+NEAR = 2.0
 #: Columns of `Cones.flare`: height and widening of the foot (m), lobes, their depth and phase.
 FLARE = 5
 
@@ -56,6 +58,7 @@ class Joints(NamedTuple):
     point: _Floats  # (j, 3) where they part
     reach: _Floats  # (j,) distance at which the blend has faded, m
     thin: _Floats  # (j,) radius of the thinner limb there, m
+    near: _Floats  # (j,) distance from either limb's surface at which the blend has faded, m
     first: _Ints  # (j, 2) first cone of either axis within reach
     last: _Ints  # (j, 2) one past the last
     place: _Ints  # (places + 1,) first joint of each place
@@ -389,31 +392,34 @@ def _headings(cones: Cones, first: _Ints, axis: int, point: _Floats, ahead: floa
 
 def _joints(skeleton: Skeleton, cones: Cones, chains: list[_Ints], first: _Ints) -> Joints:
     """List the pairs of axes that share a joint: limb and parent, and limbs of one base."""
-    rows: list[tuple[_Floats, float, float, int, int]] = []
+    rows: list[tuple[_Floats, float, float, int, int, float]] = []
     place = [0]
     for bases in _bases(skeleton, cones, chains, first).values():
         for together in _places(bases):
             for base in together:
                 thick, thin = sorted((base.parent_radius, base.radius), reverse=True)
                 reach = _reach(cones, first, base.child, base.parent, base.point, thick, thin)
-                rows.append((base.point, reach, thin, base.parent, base.child))
+                near = NEAR * float(np.sqrt(thick * thin))
+                rows.append((base.point, reach, thin, base.parent, base.child, near))
             for k, one in enumerate(together):
                 for other in together[k + 1 :]:
                     thick, thin = sorted((one.radius, other.radius), reverse=True)
                     reach = _reach(cones, first, one.child, other.child, one.point, thick, thin)
-                    rows.append((one.point, reach, thin, one.child, other.child))
+                    near = NEAR * float(np.sqrt(thick * thin))
+                    rows.append((one.point, reach, thin, one.child, other.child, near))
             place.append(len(rows))
     n = len(rows)
     point = np.array([row[0] for row in rows]).reshape(n, 3)
     reaches = np.array([row[1] for row in rows])
     lower, upper = np.zeros((n, 2), np.int64), np.zeros((n, 2), np.int64)
     for j, row in enumerate(rows):
-        for k, axis in enumerate(row[3:]):
+        for k, axis in enumerate(row[3:5]):
             lower[j, k], upper[j, k] = _within(cones, first, int(axis), point[j], float(reaches[j]))
     return Joints(
         point=point,
         reach=reaches,
         thin=np.array([row[2] for row in rows]),
+        near=np.array([row[5] for row in rows]),
         first=lower,
         last=upper,
         place=np.array(place, np.int64),

@@ -170,8 +170,16 @@ def joint(field: Any, j: Any, x: Any, y: Any, z: Any) -> Any:
     if share <= 0.0:
         return np.inf, np.inf, 0.0
     soft = _SOFT * joints.thin[j]
-    a = _side(field.cones, joints.first[j, 0], joints.last[j, 0], soft, x, y, z)
     b = _side(field.cones, joints.first[j, 1], joints.last[j, 1], soft, x, y, z)
+    if not field.printed[0]:
+        share *= fall_off(max(b[0], 0.0) / joints.near[j])
+    if share <= 0.0:
+        return np.inf, np.inf, 0.0
+    a = _side(field.cones, joints.first[j, 0], joints.last[j, 0], soft, x, y, z)
+    if not field.printed[0]:
+        share *= fall_off(max(a[0], 0.0) / joints.near[j])
+    if share <= 0.0:
+        return np.inf, np.inf, 0.0
     plain = min(a[0], b[0])
     if field.printed[0]:
         return (1.0 - share) * plain + share * printed_blend(x, y, z, a, b), plain, share
@@ -356,11 +364,11 @@ class Blend:
         wide = (wide + cones.flare[cones.axis, 1])[:, None]
         low = np.minimum(cones.start, cones.end) - wide
         high = np.maximum(cones.start, cones.end) + wide
-        reach = joints.reach[:, None]
         starts = joints.place[:-1]
         if len(starts):
-            place_low = np.minimum.reduceat(joints.point - reach, starts, axis=0)
-            place_high = np.maximum.reduceat(joints.point + reach, starts, axis=0)
+            lower, upper = _joint_boxes(joints, low, high, printed)
+            place_low = np.minimum.reduceat(lower, starts, axis=0)
+            place_high = np.maximum.reduceat(upper, starts, axis=0)
         else:
             place_low = place_high = np.zeros((0, 3))
         boxes, places = boxes_of(low, high), boxes_of(place_low, place_high)
@@ -395,6 +403,19 @@ class Blend:
         cones = self.limbs.cones
         length = np.linalg.norm(cones.end[which] - cones.start[which], axis=1)
         return OnLimb(cones.axis[which], cones.along[which] + t * length, radius, which)
+
+
+def _joint_boxes(
+    joints: Joints, low: _Floats, high: _Floats, printed: bool
+) -> tuple[_Floats, _Floats]:
+    """Boxes in which pairs of limbs can blend: in reach of the joint, and near either limb."""
+    lower, upper = joints.point - joints.reach[:, None], joints.point + joints.reach[:, None]
+    for j in range(0 if printed else len(joints.reach)):
+        for k in range(2):
+            own = slice(joints.first[j, k], joints.last[j, k])
+            lower[j] = np.maximum(lower[j], low[own].min(axis=0) - joints.near[j])
+            upper[j] = np.minimum(upper[j], high[own].max(axis=0) + joints.near[j])
+    return lower, upper
 
 
 def _as_points(points: ArrayLike) -> _Floats:

@@ -1,0 +1,310 @@
+"""The flow of a chain of particles from the foot of a tree to its tips."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest.errors import InputError
+from forest.surface.blend.field import Blend
+from forest.surface.flow.chain import (
+    DONE,
+    FLOWING,
+    Chain,
+    Forces,
+    advance,
+    empty_chain,
+    grain_heading,
+    put,
+    with_room,
+)
+from forest.surface.flow.surface import Limbed, limbed
+from forest.surface.flow.trails import Trails
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+#: Steps between two points of a trail.
+RECORD_EVERY = 5
+#: The chain is stuck when it moves slower than this share of the speed at which it started.
+_STUCK = 0.02
+#: Height of the ring at the start above the ground, units.
+_START = 0.1
+
+
+@dataclass(frozen=True)
+class FlowRules:
+    """Constants of the chain of particles; the defaults are those of Hart & Baker 2003, 5.3.
+
+    Attributes
+    ----------
+    steps_per_s : float
+        Time steps a second.
+    speed : float
+        Speed of particles at the start, upward, units/s.
+    greatest_link, least_link : float
+        Longer links get a new particle, shorter ones lose one; units.
+    spring, damping : float
+        Between linked particles, 1/s2 and 1/s.
+    skeleton_spring, skeleton_damping : float
+        Between particles and the skeleton, 1/s2 and 1/s.
+    spiral_deg : float
+        Angle of the velocity at the start from upward; positive leans to the right seen from
+        outside (a right-handed spiral).
+    steering : float
+        Rate at which, in a loop that is on one limb alone, velocities turn to the direction of
+        the limb (leaning by `spiral_deg`), 1/s. 0: momentum alone, as printed; then the flow
+        curls on where it came onto a limb from the side.
+    """
+
+    steps_per_s: float = 100.0
+    speed: float = 2.0
+    greatest_link: float = 0.15
+    least_link: float = 0.05
+    spring: float = 100.0
+    damping: float = 1.0
+    skeleton_spring: float = 100.0
+    skeleton_damping: float = 10.0
+    spiral_deg: float = 0.0
+    steering: float = 2.0
+
+    def forces(self, unit_m: float) -> Forces:
+        """Give the same in metres."""
+        lean = math.radians(self.spiral_deg)
+        return Forces(
+            step=1.0 / self.steps_per_s,
+            greatest=self.greatest_link * unit_m,
+            least=self.least_link * unit_m,
+            spring=self.spring,
+            damping=self.damping,
+            skeleton_spring=self.skeleton_spring,
+            skeleton_damping=self.skeleton_damping,
+            steering=self.steering,
+            lean_cos=math.cos(lean),
+            lean_sin=math.sin(lean),
+        )
+
+
+@dataclass(frozen=True)
+class Loops:
+    """A chain at one time, as closed loops.
+
+    Attributes
+    ----------
+    time_s : float
+        When.
+    place : float64 (n, 3)
+        Places of its particles, loop by loop in order, m.
+    limb : int32 (n,)
+        Axes they are on.
+    first : int64 (loops + 1,)
+        First particle of each loop.
+    """
+
+    time_s: float
+    place: _Floats
+    limb: NDArray[np.int32]
+    first: _Ints
+
+    def __len__(self) -> int:
+        """Count the loops."""
+        return len(self.first) - 1
+
+
+@dataclass(frozen=True)
+class Flow:
+    """What a chain of particles left on a surface.
+
+    Attributes
+    ----------
+    trails : Trails
+        The ways of all particles.
+    unit_m : float
+        Length of one unit of the paper, m.
+    relinked : int
+        How often the chain was relinked.
+    stuck : int
+        Particles that did not come to a tip.
+    chains : list of Loops
+        The chain itself, now and then.
+    """
+
+    trails: Trails
+    unit_m: float
+    relinked: int
+    stuck: int
+    chains: list[Loops]
+
+
+def _start(surface: Limbed, rules: FlowRules, unit: float) -> Chain:
+    """Lay a ring of particles around the foot."""
+    cones = surface.field.cones
+    grounded = np.flatnonzero(np.isfinite(cones.ground[cones.axis]) & (cones.along == 0.0))
+    foot = int(grounded[0]) if len(grounded) else 0
+    line = cones.end[foot] - cones.start[foot]
+    line /= np.linalg.norm(line)
+    side = np.cross(line, np.eye(3)[int(np.argmin(np.abs(line)))])
+    side /= np.linalg.norm(side)
+    other = np.cross(line, side)
+    radius = cones.low[foot] + cones.flare[cones.axis[foot], 1]
+    mean = 0.5 * (rules.greatest_link + rules.least_link) * unit
+    n = max(6, math.ceil(2.0 * math.pi * radius / mean))
+    chain = empty_chain(16 * n)
+    base = cones.start[foot] + _START * unit * line
+    lean = math.radians(rules.spiral_deg)
+    for i in range(n):
+        turn = 2.0 * math.pi * i / n
+        x, y, z = base + radius * (math.cos(turn) * side + math.sin(turn) * other)
+        chain.cone[i] = foot
+        chain.state[i] = FLOWING
+        put(surface, chain, np.int64(i), float(x), float(y), float(z))
+        way = grain_heading(chain.normal[i], line, math.cos(lean), math.sin(lean))
+        chain.velocity[i] = rules.speed * unit * np.array(way)
+        chain.ahead[i], chain.behind[i] = (i + 1) % n, (i - 1) % n
+        chain.live[i] = i
+    chain.mother[:n] = -1
+    chain.tally[:2] = n
+    return chain
+
+
+def _loops(chain: Chain, time_s: float) -> Loops:
+    """Walk a chain's loops."""
+    left = set(chain.live[: chain.tally[1]].tolist())
+    order: list[int] = []
+    first = [0]
+    for i in chain.live[: chain.tally[1]].tolist():
+        if i not in left:
+            continue
+        k = i
+        while k in left:
+            left.remove(k)
+            order.append(k)
+            k = int(chain.ahead[k])
+        first.append(len(order))
+    return Loops(time_s, chain.place[order].copy(), chain.limb[order].copy(), np.array(first))
+
+
+def flow(
+    blend: Blend,
+    *,
+    unit_m: float | None = None,
+    rules: FlowRules | None = None,
+    seconds: float | None = None,
+    show_every_s: float = 0.5,
+) -> Flow:
+    """Let a ring-shaped chain of particles flow from the foot of a tree to its tips.
+
+    Hart & Baker 2003, section 5.3, with their constants. The chain parts at branchings
+    (Table 2); a link that grows too long gets a new particle. After each step particles are put
+    back onto the surface, since springs of no length pull them inside.
+
+    Parameters
+    ----------
+    blend : Blend
+        The blended surface of a tree. A limb much thinner than a link does not part the chain.
+    unit_m : float, optional
+        Length of the paper's unit, m; by default the radius of the trunk at its foot, so that a
+        ring there has about 60 particles. A smaller one reaches thinner limbs.
+    rules : FlowRules, optional
+        The constants.
+    seconds : float, optional
+        When to stop, s; by default when all loops are at tips, or stuck.
+    show_every_s : float
+        How often the chain itself is kept.
+
+    Returns
+    -------
+    Flow
+        The trails, and the chain now and then.
+
+    Raises
+    ------
+    InputError
+        If a length is not above 0, or the longest link is not longer than twice the shortest.
+    """
+    rules = rules or FlowRules()
+    surface = limbed(blend)
+    cones = surface.field.cones
+    unit = float(cones.low[0]) if unit_m is None else unit_m
+    if not unit > 0.0:
+        raise InputError(f"{unit:g} m", where="unit_m", expected="a length above 0")
+    if not rules.greatest_link > 2.0 * rules.least_link > 0.0:
+        raise InputError(
+            f"links from {rules.least_link:g} to {rules.greatest_link:g}",
+            where="rules.greatest_link",
+            expected="more than twice the shortest, so that split links are not merged again",
+        )
+    forces = rules.forces(unit)
+    chain = _start(surface, rules, unit)
+    far = float(np.linalg.norm(cones.end - cones.start, axis=1).sum())
+    longest = 4.0 * far / (rules.speed * unit) if seconds is None else seconds
+    trails = _Recorder()
+    shown = [_loops(chain, 0.0)]
+    trails.take(chain, 0.0)
+    done, next_show = 0, show_every_s
+    while done < longest * rules.steps_per_s:
+        taken, flowing = advance(surface, chain, forces, np.int64(RECORD_EVERY))
+        done += taken
+        if taken < RECORD_EVERY and flowing:
+            chain = with_room(chain, 2 * len(chain.live))
+            continue
+        time_s = done * forces.step
+        trails.take(chain, time_s)
+        if time_s >= next_show or not flowing:
+            shown.append(_loops(chain, time_s))
+            next_show += show_every_s
+            if not flowing or _is_stuck(chain, rules.speed * unit):
+                break
+    live = chain.live[: chain.tally[1]]
+    return Flow(
+        trails=trails.trails(chain),
+        unit_m=unit,
+        relinked=int(chain.tally[2]),
+        stuck=int(np.count_nonzero(chain.state[live] != DONE)),
+        chains=shown,
+    )
+
+
+def _is_stuck(chain: Chain, speed: float) -> bool:
+    """Whether what still flows hardly moves."""
+    live = chain.live[: chain.tally[1]]
+    live = live[chain.state[live] == FLOWING]
+    return float(np.abs(chain.velocity[live]).max(initial=0.0)) < _STUCK * speed
+
+
+class _Recorder:
+    """Keeps the places of particles over time."""
+
+    def __init__(self) -> None:
+        self._number: list[_Ints] = []
+        self._place: list[_Floats] = []
+        self._limb: list[NDArray[np.int32]] = []
+        self._off: list[_Floats] = []
+        self._time: list[float] = []
+
+    def take(self, chain: Chain, time_s: float) -> None:
+        live = chain.live[: chain.tally[1]]
+        self._number.append(live.copy())
+        self._place.append(chain.place[live])
+        self._limb.append(chain.limb[live])
+        self._off.append(chain.off[live])
+        self._time.append(time_s)
+
+    def trails(self, chain: Chain) -> Trails:
+        number = np.concatenate(self._number)
+        time = np.repeat(self._time, [len(part) for part in self._number])
+        order = np.argsort(number, kind="stable")  # by particle, then by time
+        number = number[order]
+        names, first = np.unique(number, return_index=True)
+        return Trails(
+            place=np.concatenate(self._place)[order],
+            time_s=time[order],
+            limb=np.concatenate(self._limb)[order],
+            off_m=np.concatenate(self._off)[order],
+            first=np.append(first, len(number)),
+            mother=chain.mother[names],
+            particle=names,
+        )

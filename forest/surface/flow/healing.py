@@ -1,0 +1,388 @@
+"""Wounds that heal: a pruned stub is overgrown over the years (Hart & Baker 2003, section 6.2).
+
+The paper only names the wish; the law is our own and simple. Where cambium lives, the surface
+moves outward by the year's ring. The cut face has none: a roll of woundwood closes over it from
+its rim, `closing` times as fast as the ring is wide (callus at a wound's rim grows faster than
+the stem: Neely 1988). So a face of radius r closes once the stem has grown by r / closing, and the
+dent above it is gone after twice that. A stub feeds on its stem alone and grows slower than it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forest.errors import InputError
+from forest.surface.blend.cones import limbs_of
+from forest.surface.blend.field import Blend
+from forest.surface.flow.cover import Cover, Near, around_limbs, cover, settle_cover
+from forest.trees.skeleton import Skeleton
+
+_Floats = NDArray[np.float64]
+
+#: Width of the rounding between stub and stem, times the stub's radius.
+_COLLAR = 0.5
+#: Step of differences, times the radius of the wound.
+_STEP = 1e-5
+_PROJECTIONS = 40
+#: Points at which the face is looked at, per radius.
+_FACE_ROWS = 24
+_ROUNDS_A_YEAR = 12
+
+
+@dataclass(frozen=True)
+class Wound:
+    """The face that is left where a limb was cut.
+
+    Attributes
+    ----------
+    middle : float64 (3,)
+        Middle of the face, m.
+    heading : float64 (3,)
+        Unit vector out of the wood, at right angles to the face.
+    radius_m : float
+        Radius of the face.
+    stub_m : float
+        How long the limb's rest is, from the stem's axis to the face.
+    """
+
+    middle: _Floats
+    heading: _Floats
+    radius_m: float
+    stub_m: float
+
+
+@dataclass(frozen=True)
+class WoundRules:
+    """How a wound closes.
+
+    Attributes
+    ----------
+    closing : float
+        How far the woundwood closes in from the rim, times the width of the year's ring.
+    stub_growth : float
+        Growth of the wood of the stub, times that of the stem, 0 to below 1.
+    """
+
+    closing: float = 3.0
+    stub_growth: float = 0.25
+
+
+@dataclass(frozen=True)
+class HealedYear:
+    """A wounded stem after some years.
+
+    Attributes
+    ----------
+    year : int
+        Years since the cut.
+    grown_m : float
+        By how much the stem's radius has grown since.
+    open_m2 : float
+        Area of the face that is still open.
+    roughness_deg : float
+        Greatest angle, over the wound, between the surface and that of a stem without one.
+    surface : WoundedStem
+        The surface.
+    cover : Cover
+        Particles all over it.
+    open : bool (n,)
+        Which of them lie on the open face.
+    """
+
+    year: int
+    grown_m: float
+    open_m2: float
+    roughness_deg: float
+    surface: WoundedStem
+    cover: Cover
+    open: NDArray[np.bool_]
+
+
+def prune(skeleton: Skeleton, axis: int, *, stub_m: float) -> tuple[Skeleton, Wound]:
+    """Cut a limb, and all that it bears, at a distance from the axis that it grows from.
+
+    Returns
+    -------
+    tuple of Skeleton, Wound
+        The tree without the limb, and the face that its rest has; the rest itself is part of the
+        wound (`WoundedStem`).
+
+    Raises
+    ------
+    InputError
+        If there is no such limb, or the cut lies beyond its tip.
+    """
+    chain = np.flatnonzero(skeleton.axis == axis)
+    if len(chain) == 0 or skeleton.parent[chain[0]] < 0:
+        raise InputError(
+            f"{axis} is no limb", where="axis", expected=f"1 to {int(skeleton.axis.max())}"
+        )
+    length = np.cumsum(skeleton.length[chain])
+    if not 0.0 < stub_m < length[-1]:
+        raise InputError(
+            f"a stub of {stub_m:g} m", where="stub_m", expected=f"above 0, below {length[-1]:.3g} m"
+        )
+    at = int(np.searchsorted(length, stub_m))
+    cut = chain[at]
+    heading = skeleton.end[cut] - skeleton.start[cut]
+    heading = heading / np.linalg.norm(heading)
+    middle = skeleton.end[cut] - (length[at] - stub_m) * heading
+    gone = np.zeros(len(skeleton), np.bool_)
+    gone[chain[0]] = True
+    for i in range(int(chain[0]) + 1, len(skeleton)):
+        gone[i] = skeleton.parent[i] >= 0 and gone[skeleton.parent[i]]
+    number = np.cumsum(~gone) - 1
+    parent = skeleton.parent[~gone]
+    rest = replace(
+        skeleton,
+        **{
+            name: getattr(skeleton, name)[~gone]
+            for name in ("start", "end", "radius", "order", "birth_year", "leafy", "serial")
+        },
+        parent=np.where(parent >= 0, number[parent], -1).astype(np.int32),
+        axis=np.unique(skeleton.axis[~gone], return_inverse=True)[1].astype(np.int32),
+    )
+    return rest, Wound(middle, heading, float(skeleton.radius[cut]), stub_m)
+
+
+@dataclass(frozen=True)
+class WoundedStem:
+    """A stem with a wound, when its radius has grown by `grown_m` since the cut.
+
+    Attributes
+    ----------
+    stem : Blend
+        The tree without the limb, at the cut.
+    wound : Wound
+        The cut.
+    rules : WoundRules
+        How it closes.
+    grown_m : float
+        Growth of the stem's radius since, m.
+    """
+
+    stem: Blend
+    wound: Wound
+    rules: WoundRules
+    grown_m: float = 0.0
+
+    def _cut_frame(self, points: _Floats) -> tuple[_Floats, _Floats]:
+        """Height of points above the face, and distance from its middle line."""
+        away = points - self.wound.middle
+        height = away @ self.wound.heading
+        return height, np.linalg.norm(away - height[:, None] * self.wound.heading, axis=1)
+
+    def growth(self, points: _Floats) -> _Floats:
+        """Give how far the stem's surface has moved outward at points (n,), m."""
+        height, aside = self._cut_frame(points)
+        radius, closed = self.wound.radius_m, self.rules.closing * self.grown_m
+        rounded = np.hypot(aside, max(0.0, closed - radius))  # once closed, the dent fills
+        behind = np.where(height > -0.5 * self.wound.stub_m, np.maximum(radius - rounded, 0.0), 0.0)
+        square = self.grown_m**2 - (behind / self.rules.closing) ** 2
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+    def _from_wood(self, points: _Floats, growth: _Floats) -> _Floats:
+        """Distance from stem and stub of the year of the cut, less their growth."""
+        height, aside = self._cut_frame(points)
+        radius = self.wound.radius_m
+        out, up = aside - radius, height
+        low = -self.wound.stub_m - height
+        stub = np.where(
+            (out > 0.0) & (up > 0.0), np.hypot(out, up), np.maximum(np.maximum(out, up), low)
+        )
+        stub -= self.rules.stub_growth * growth
+        stem = self.stem.value(points) - growth
+        width = _COLLAR * radius * np.clip(out / (0.5 * radius), 0.0, 1.0)
+        near = np.maximum(1.0 - np.abs(stem - stub) / np.maximum(width, 1e-12), 0.0)
+        return np.asarray(np.minimum(stem, stub) - 0.25 * width * near * near)
+
+    def value(self, points: ArrayLike) -> _Floats:
+        """Give about the distance from the surface (n,), m, negative inside."""
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        return self._from_wood(points, self.growth(points))
+
+    def gradient(self, points: ArrayLike) -> _Floats:
+        """Give the slope of `value` (n, 3)."""
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        return self._slope(points, None)
+
+    def _slope(self, points: _Floats, growth: _Floats | None) -> _Floats:
+        step = _STEP * self.wound.radius_m
+        slope = np.empty_like(points)
+        for k in range(3):
+            ahead, back = points.copy(), points.copy()
+            ahead[:, k] += step
+            back[:, k] -= step
+            if growth is None:
+                slope[:, k] = self.value(ahead) - self.value(back)
+            else:
+                slope[:, k] = self._from_wood(ahead, growth) - self._from_wood(back, growth)
+        return slope / (2.0 * step)
+
+    def project(self, points: ArrayLike) -> _Floats:
+        """Move points onto the surface, out of the wood of the year of the cut.
+
+        The growth, which rises steeply at the rim of the woundwood, is held during each step.
+        """
+        points = np.array(points, np.float64).reshape(-1, 3)
+        for k in range(_PROJECTIONS):
+            growth = self.growth(points)
+            off = self._from_wood(points, growth)
+            if np.abs(off).max(initial=0.0) < 1e-7 * self.wound.radius_m:
+                break
+            slope = self._slope(points, growth)
+            share = 1.0 if k < _PROJECTIONS // 2 else 0.5  # at a rim whole steps may swing
+            points -= (share * off / np.maximum(np.sum(slope**2, axis=1), 0.25))[:, None] * slope
+        return points
+
+    def on_open_face(self, points: _Floats) -> NDArray[np.bool_]:
+        """Tell which points of the surface lie on the face, with no wood grown over them."""
+        height, aside = self._cut_frame(points)
+        near = 0.01 * self.wound.radius_m
+        over = (aside < self.wound.radius_m) & (np.abs(height) < near)
+        return np.asarray(over & (self.growth(points) <= 0.0), np.bool_)
+
+    def open_area(self) -> float:
+        """Measure the part of the face above which no wood has grown, m2."""
+        rows = np.arange(-_FACE_ROWS, _FACE_ROWS + 1) / _FACE_ROWS * self.wound.radius_m
+        side, other = _across(self.wound.heading)
+        u, v = (grid.ravel() for grid in np.meshgrid(rows, rows))
+        within = np.hypot(u, v) < self.wound.radius_m
+        face = self.wound.middle + u[within, None] * side + v[within, None] * other
+        above = self.value(face + 1e-6 * self.wound.radius_m * self.wound.heading) > 0.0
+        return float(np.pi * self.wound.radius_m**2 * np.count_nonzero(above) / len(face))
+
+    def roughness(self, points: _Floats, normals: _Floats) -> float:
+        """Greatest angle between the surface over the wound and the bare stem, degrees."""
+        _, aside = self._cut_frame(points)
+        height = (points - self.wound.middle) @ self.wound.heading
+        near = (aside < 1.5 * self.wound.radius_m) & (height > -0.5 * self.wound.stub_m)
+        if not near.any():
+            return 0.0
+        bare = self.stem.gradient(points[near])
+        bare /= np.linalg.norm(bare, axis=1, keepdims=True)
+        cosine = np.clip(np.sum(bare * normals[near], axis=1), -1.0, 1.0)
+        return float(np.degrees(np.arccos(cosine.min())))
+
+
+def _across(heading: _Floats) -> tuple[_Floats, _Floats]:
+    """Give two unit vectors at right angles to a direction and each other."""
+    side = np.cross(heading, np.eye(3)[int(np.argmin(np.abs(heading)))])
+    side = side / np.linalg.norm(side)
+    return side, np.cross(heading, side)
+
+
+def _on_stub(wound: Wound, spacing: float) -> _Floats:
+    """Scatter points on the face and around the stub."""
+    side, other = _across(wound.heading)
+    points = [wound.middle]
+    for radius in np.arange(0.5 * spacing, wound.radius_m, spacing):
+        turn = np.arange(max(3, round(2.0 * np.pi * radius / spacing))) * (spacing / radius)
+        points += [
+            wound.middle + radius * (np.cos(a) * side + np.sin(a) * other)
+            for a in turn[turn < 2.0 * np.pi]
+        ]
+    around = max(6, round(2.0 * np.pi * wound.radius_m / spacing))
+    for back in np.arange(0.5 * spacing, wound.stub_m, spacing):
+        points += [
+            wound.middle
+            - back * wound.heading
+            + wound.radius_m * (np.cos(a) * side + np.sin(a) * other)
+            for a in 2.0 * np.pi * np.arange(around) / around
+        ]
+    return np.array(points)
+
+
+def heal(
+    skeleton: Skeleton,
+    wound: Wound,
+    ring_widths_m: ArrayLike,
+    *,
+    rules: WoundRules | None = None,
+    spacing_m: float | None = None,
+    reach_m: float | None = None,
+    seed: int = 0,
+) -> list[HealedYear]:
+    """Let a wound be overgrown, year by year, on a stem that is covered with particles.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The tree without the limb (see `prune`).
+    wound : Wound
+        The cut.
+    ring_widths_m : float64 (years,)
+        Width of each year's ring of the stem, m (from the table of rings, or assumed).
+    rules : WoundRules, optional
+        How it closes.
+    spacing_m : float, optional
+        Distance of particles, m; by default a fifth of the wound's radius.
+    reach_m : float, optional
+        How far around the wound the surface is covered, m; by default three of its radii and as
+        far as the stub stands out.
+    seed : int
+        Of the random numbers of splits.
+
+    Returns
+    -------
+    list of HealedYear
+        The cut itself, then each year.
+
+    Raises
+    ------
+    InputError
+        If a ring is negative, or a rule out of its range.
+    """
+    rules = rules or WoundRules()
+    rings = np.asarray(ring_widths_m, np.float64).reshape(-1)
+    if not (np.isfinite(rings).all() and (rings >= 0.0).all()):
+        raise InputError("a ring's width is negative or not a number", where="ring_widths_m")
+    if not (rules.closing > 0.0 and 0.0 <= rules.stub_growth < 1.0):
+        raise InputError(
+            f"closing {rules.closing:g}, stub_growth {rules.stub_growth:g}",
+            where="rules",
+            expected="closing above 0, stub_growth from 0 to below 1",
+        )
+    spacing = 0.2 * wound.radius_m if spacing_m is None else spacing_m
+    stem = Blend.of(limbs_of(skeleton))
+    out = max(float(stem.value(wound.middle)[0]), 0.0)
+    reach = 3.0 * wound.radius_m + out if reach_m is None else reach_m
+    near = Near(wound.middle, reach)
+    surface = WoundedStem(stem, wound, rules)
+    start = np.concatenate((around_limbs(stem, spacing, near), _on_stub(wound, spacing)))
+    start = start[surface.value(start) > -0.5 * spacing]  # not within the wood
+    particles = cover(stem, spacing, seed=seed, surface=surface, start=start, near=near)
+    years = [_year(0, surface, particles)]
+    for year, ring in enumerate(rings, start=1):
+        surface = replace(surface, grown_m=surface.grown_m + float(ring))
+        moved = surface.project(particles.place)
+        particles = settle_cover(
+            surface,
+            replace(particles, place=moved, normal=_unit(surface.gradient(moved))),
+            seed=seed,
+            rounds=_ROUNDS_A_YEAR,
+            start=1000 * year,
+            near=near,
+        )
+        years.append(_year(year, surface, particles))
+    return years
+
+
+def _unit(vectors: _Floats) -> _Floats:
+    size = np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return np.asarray(vectors / size)
+
+
+def _year(year: int, surface: WoundedStem, particles: Cover) -> HealedYear:
+    return HealedYear(
+        year=year,
+        grown_m=surface.grown_m,
+        open_m2=surface.open_area(),
+        roughness_deg=surface.roughness(particles.place, particles.normal),
+        surface=surface,
+        cover=particles,
+        open=surface.on_open_face(particles.place),
+    )

@@ -1,0 +1,122 @@
+"""Particles on the blended surface: how one is put there, and what it then knows of its limb."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest._jit import njit
+from forest.surface.blend.field import Blend, cone, gradient, value
+
+_Floats = NDArray[np.float64]
+
+#: A particle is on the surface if it is off by less than this, times the limb's radius.
+CLOSE = 1e-4
+_NEWTON_STEPS = 12
+_HALVINGS = 30
+#: Greatest slope that a smooth blend has.
+_STEEPEST = 4.0
+
+
+class Surface(Protocol):
+    """A surface on which particles live; `Blend` and a healing stem are such."""
+
+    def value(self, points: _Floats) -> _Floats:
+        """Give about the distance from the surface (n,), m, negative inside."""
+
+    def gradient(self, points: _Floats) -> _Floats:
+        """Give the slope of `value` (n, 3)."""
+
+    def project(self, points: _Floats) -> _Floats:
+        """Move points onto the surface."""
+
+
+class Limbed(NamedTuple):
+    """What a kernel needs of a surface with limbs."""
+
+    field: Any  # of `forest.surface.blend.field`
+    free: NDArray[np.bool_]  # (axes,) whether the axis ends in a tip, not in a fork
+
+
+def limbed(blend: Blend) -> Limbed:
+    """Add to a blended surface which of its axes end in a tip.
+
+    An axis ends in a fork if another starts within one and a half of its radii from its end.
+    """
+    cones = blend.limbs.cones
+    last = np.flatnonzero(np.append(np.diff(cones.axis) != 0, True))
+    first = np.concatenate(([0], last[:-1] + 1))
+    free = np.ones(len(cones.reach), np.bool_)
+    for k, end in enumerate(last):
+        away = np.linalg.norm(cones.start[first] - cones.end[end], axis=1)
+        away[k] = np.inf
+        free[cones.axis[end]] = away.min() > 1.5 * cones.high[end]
+    return Limbed(blend.kernel, free)
+
+
+@njit
+def _along_ray(field: Any, x: Any, y: Any, z: Any, which: Any) -> Any:
+    """Find the surface on the ray from the limb's axis through a point, by halving."""
+    _, r, fx, fy, fz, _ = cone(field.cones, which, x, y, z)
+    dx, dy, dz = x - fx, y - fy, z - fz
+    size = max(np.sqrt(dx * dx + dy * dy + dz * dz), 1e-12)
+    dx, dy, dz = dx / size, dy / size, dz / size
+    inside, outside = 0.0, size
+    while value(field, fx + outside * dx, fy + outside * dy, fz + outside * dz, which)[0] < 0.0:
+        inside = outside
+        outside += 0.25 * r
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if value(field, fx + middle * dx, fy + middle * dy, fz + middle * dz, which)[0] < 0.0:
+            inside = middle
+        else:
+            outside = middle
+    return fx + outside * dx, fy + outside * dy, fz + outside * dz, outside - inside
+
+
+@njit
+def settle(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
+    """Move a point onto the surface by Newton steps along the slope.
+
+    Returns
+    -------
+    tuple
+        The place (3), the unit normal there (3), how far it still is off, and its cone.
+    """
+    f, which = value(field, x, y, z, hint)
+    gx, gy, gz = gradient(field, x, y, z, which)
+    for _ in range(_NEWTON_STEPS):
+        cones = field.cones
+        if abs(f) <= CLOSE * min(cones.low[which], cones.high[which]):
+            break
+        step = f / max(gx * gx + gy * gy + gz * gz, 0.25)
+        x, y, z = x - step * gx, y - step * gy, z - step * gz
+        f, which = value(field, x, y, z, which)
+        gx, gy, gz = gradient(field, x, y, z, which)
+    else:  # a crease: slopes lead from one side to the other
+        x, y, z, off = _along_ray(field, x, y, z, which)
+        f, which = value(field, x, y, z, which)
+        f = min(abs(f), off)  # where the function jumps, the surface is in the jump
+        gx, gy, gz = gradient(field, x, y, z, which)
+    if gx * gx + gy * gy + gz * gz > _STEEPEST * _STEEPEST:
+        _, _, fx, fy, fz, _ = cone(field.cones, which, x, y, z)
+        gx, gy, gz = x - fx, y - fy, z - fz
+    size = max(np.sqrt(gx * gx + gy * gy + gz * gz), 1e-12)
+    return x, y, z, gx / size, gy / size, gz / size, f, which
+
+
+@njit
+def foot(surface: Any, which: Any, x: Any, y: Any, z: Any) -> Any:
+    """Give the nearest point on the limb's axis (3), its heading (3), and whether it is a tip."""
+    cones = surface.field.cones
+    _, _, fx, fy, fz, t = cone(cones, which, x, y, z)
+    lx = cones.end[which, 0] - cones.start[which, 0]
+    ly = cones.end[which, 1] - cones.start[which, 1]
+    lz = cones.end[which, 2] - cones.start[which, 2]
+    size = np.sqrt(lx * lx + ly * ly + lz * lz)
+    axis = cones.axis[which]
+    last = which + 1 == len(cones.axis) or cones.axis[which + 1] != axis
+    at_tip = last and t >= 1.0 and surface.free[axis]
+    return fx, fy, fz, lx / size, ly / size, lz / size, at_tip

@@ -1,0 +1,205 @@
+"""The chain of particles: relinking, staying on the surface, grain and spiral grain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from forest._threads import using_threads
+from forest.errors import InputError
+from forest.surface.blend.cones import limbs_of
+from forest.surface.blend.field import Blend
+from forest.surface.flow import Flow, FlowRules, angle_to_limb, flow, grain
+from forest.surface.flow.chain import FLOWING, _push, empty_chain
+from forest.surface.flow.relink import relink
+from tests.reference import flow as slow
+from tests.surface.limbs import branched, pole
+
+PRINTED = FlowRules(steering=0.0)
+
+
+@pytest.fixture(scope="module")
+def junction() -> tuple[Blend, Flow]:
+    blend = Blend.of(limbs_of(branched()))
+    return blend, flow(blend)
+
+
+def _loops(ahead: np.ndarray) -> list[set[int]]:
+    left, found = set(range(len(ahead))), []
+    while left:
+        loop, k = set(), min(left)
+        while k not in loop:
+            loop.add(k)
+            k = int(ahead[k])
+        found.append(loop)
+        left -= loop
+    return found
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    n=st.integers(4, 24),
+    limbs=st.integers(2, 3),
+    seed=st.integers(0, 10_000),
+    printed=st.booleans(),
+)
+def test_relinking_is_table_2(n: int, limbs: int, seed: int, printed: bool) -> None:
+    rng = np.random.default_rng(seed)
+    turn = 2.0 * np.pi * np.arange(n) / n
+    place = np.column_stack((np.cos(turn), 0.3 * np.sin(turn), np.zeros(n)))
+    place += rng.normal(0.0, 0.1, (n, 3))
+    limb = rng.integers(0, limbs, n).astype(np.int32)
+    foot, heading = rng.normal(0.0, 0.4, (n, 3)), np.tile([0.1, 0.2, 1.0], (n, 1))
+    heading /= np.linalg.norm(heading[0])
+    ahead, behind = (np.arange(n) + 1) % n, (np.arange(n) - 1) % n
+    links = {k: int(ahead[k]) for k in range(n)}
+
+    def goes_around(part: list[int], about: int) -> bool:
+        way = [place[k] for k in part]
+        return abs(slow.turns(way, foot[about], heading[about])) > 0.5
+
+    def allowed(one: list[int], other: list[int]) -> bool:
+        return printed or (goes_around(one, one[0]) and goes_around(other, other[0]))
+
+    for a in range(n):
+        b = int(ahead[a])
+        count = relink(a, b, limb, place, ahead, behind, foot, heading, printed)
+        assert count == slow.relink(a, b, limb.tolist(), place.tolist(), links, allowed)
+        assert ahead.tolist() == [links[k] for k in range(n)]
+    assert sorted(ahead) == list(range(n))
+    assert (behind[ahead] == np.arange(n)).all()
+
+
+def test_a_chain_across_a_crotch_parts_into_one_loop_for_each_limb() -> None:
+    turn = 2.0 * np.pi * np.arange(20) / 20
+    one = np.column_stack((np.cos(turn) - 1.02, np.sin(turn), np.zeros(20)))  # from the crotch
+    other = np.column_stack((1.02 - np.cos(turn), np.sin(turn), np.zeros(20)))
+    place = np.concatenate((one[1:], other[1:]))  # an eight whose crossing is open
+    limb = np.repeat([0, 1], 19).astype(np.int32)
+    ahead, behind = (np.arange(38) + 1) % 38, (np.arange(38) - 1) % 38
+    foot = np.where(limb[:, None] == 0, [-1.02, 0.0, 0.0], [1.02, 0.0, 0.0])
+    heading = np.tile([0.0, 0.0, 1.0], (38, 1))
+    place[19:] = place[19:][::-1]  # so that links over the crossing run side by side
+    place[18], place[19] = (-0.1, -0.3, 0.0), (0.3, -0.3, 0.0)
+    place[37], place[0] = (0.3, 0.0, 0.0), (-0.1, 0.0, 0.0)
+    assert relink(18, 19, limb, place, ahead, behind, foot, heading, False) == 1
+    assert _loops(ahead) == [set(range(19)), set(range(19, 38))]
+
+
+def test_links_pull_like_springs_without_length() -> None:
+    rng = np.random.default_rng(3)
+    n = 7
+    chain = empty_chain(n)
+    chain.place[:], chain.velocity[:] = rng.normal(size=(n, 3)), rng.normal(size=(n, 3))
+    chain.ahead[:], chain.behind[:] = (np.arange(n) + 1) % n, (np.arange(n) - 1) % n
+    chain.state[:] = FLOWING
+    rules = FlowRules(skeleton_damping=0.0, steering=0.0)
+    for i in range(n):
+        _push(chain, rules.forces(1.0), np.int64(i))
+    for i in range(n):
+        expected = slow.push(
+            chain.place.tolist(), chain.velocity.tolist(), i, spring=100.0, damping=1.0
+        )
+        np.testing.assert_allclose(chain.push[i], expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("rules", [PRINTED, FlowRules()], ids=["printed", "steered"])
+@pytest.mark.parametrize("angle", [40.0, 90.0])
+def test_the_chain_parts_into_two_loops_at_a_branching(rules: FlowRules, angle: float) -> None:
+    found = flow(Blend.of(limbs_of(branched(angle))), rules=rules)
+    assert found.relinked == 1
+    assert found.stuck == 0
+    counts = [len(chain) for chain in found.chains]
+    assert counts == sorted(counts)
+    assert counts[0] == 1 and counts[-1] == 2
+    last = found.chains[-1]
+    on = [set(part.tolist()) for part in np.split(last.limb, last.first[1:-1])]
+    assert sorted(on, key=min) == [{0}, {1}]
+
+
+def test_no_particle_leaves_the_surface(junction: tuple[Blend, Flow]) -> None:
+    blend, found = junction
+    place = found.trails.place
+    off = np.abs(blend.value(place)) / blend.limb(place).radius
+    assert off.max() < 0.01
+    assert np.abs(found.trails.off_m).max() < 0.01 * 0.04
+
+
+def test_links_stay_between_their_limits(junction: tuple[Blend, Flow]) -> None:
+    _, found = junction
+    for chain in found.chains[:-1]:
+        for part in np.split(chain.place, chain.first[1:-1]):
+            link = np.linalg.norm(part - np.roll(part, 1, axis=0), axis=1) / found.unit_m
+            assert link.max() < 0.15 + 1e-9
+            if len(part) > 6:
+                assert np.median(link) > 0.05
+
+
+def test_grain_follows_the_branches(junction: tuple[Blend, Flow]) -> None:
+    blend, found = junction
+    for axis, low, high in ((0, 0.02, 0.12), (0, 0.62, 0.78), (1, 0.42, 0.68)):
+        place = found.trails.place
+        on = blend.limb(place)
+        here = place[(on.axis == axis) & (on.along > low) & (on.along < high)]
+        angle = np.abs(angle_to_limb(grain(here, found.trails, blend), here, blend))
+        assert len(here) > 50
+        assert np.percentile(angle, 90) < 15.0
+        assert np.median(angle) < 6.0
+
+
+def test_grain_is_tangential_and_changes_smoothly(junction: tuple[Blend, Flow]) -> None:
+    blend, found = junction
+    turn = np.linspace(0.0, 2.0 * np.pi, 400)
+    ring = np.column_stack((0.1 * np.cos(turn), 0.1 * np.sin(turn), np.full(400, 0.6)))
+    ring = blend.project(ring)
+    ways = grain(ring, found.trails, blend)
+    np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1.0, rtol=1e-9)
+    slope = blend.gradient(ring)
+    assert np.abs(np.sum(ways * slope, axis=1)).max() < 1e-6
+    steps = np.degrees(np.arccos(np.clip(np.sum(ways[1:] * ways[:-1], axis=1), -1.0, 1.0)))
+    assert steps.max() < 5.0
+
+
+@pytest.mark.parametrize("angle", [-12.0, 20.0])
+@pytest.mark.parametrize("steering", [0.0, 2.0])
+def test_a_tangential_start_gives_spiral_grain(angle: float, steering: float) -> None:
+    blend = Blend.of(limbs_of(pole()))
+    found = flow(blend, rules=FlowRules(spiral_deg=angle, steering=steering))
+    place = found.trails.place
+    place = place[(place[:, 2] > 0.1) & (place[:, 2] < 1.8)]
+    seen = angle_to_limb(grain(place, found.trails, blend), place, blend)
+    np.testing.assert_allclose(seen, angle, atol=1.5)
+    # A whole trail: tan(angle) = way around per way up.
+    way = max(found.trails.polylines(), key=len)
+    way = way[(way[:, 2] > 0.2) & (way[:, 2] < 1.8)]
+    turn = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    slope = 0.146 * (turn[-1] - turn[0]) / (way[-1, 2] - way[0, 2])
+    assert slope == pytest.approx(np.tan(np.radians(angle)), abs=0.02)
+
+
+def test_same_bits_for_any_number_of_threads() -> None:
+    blend = Blend.of(limbs_of(branched(60.0)))
+    with using_threads(1):
+        one = flow(blend)
+        grain_one = grain(one.trails.place, one.trails, blend)
+    with using_threads(2):
+        two = flow(blend)
+        grain_two = grain(two.trails.place, two.trails, blend)
+    assert np.array_equal(one.trails.place, two.trails.place)
+    assert np.array_equal(grain_one, grain_two)
+
+
+def test_a_smaller_unit_lays_a_finer_chain() -> None:
+    blend = Blend.of(limbs_of(pole(0.15, 0.6)))
+    coarse, fine = flow(blend), flow(blend, unit_m=0.075)
+    assert len(fine.chains[0].place) == pytest.approx(2 * len(coarse.chains[0].place), abs=2)
+
+
+def test_wrong_rules_are_refused() -> None:
+    blend = Blend.of(limbs_of(pole()))
+    with pytest.raises(InputError, match="unit_m"):
+        flow(blend, unit_m=0.0)
+    with pytest.raises(InputError, match="greatest_link"):
+        flow(blend, rules=FlowRules(greatest_link=0.1, least_link=0.06))
