@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _SIZES = (256, 512, 1024, 2048, 4096)
 _BREAST_HEIGHT_M = 1.3
+_PARAMETRIC_AGE = 30.0  # years; a parametric tree has none
 _FEW_M = 2.0  # of the trunk that a picture shows
 
 
@@ -65,6 +66,9 @@ def bark(
     law: Annotated[
         str, typer.Option(help="What tears as girth grows: preset, or conserved as in the paper.")
     ] = "preset",
+    model: Annotated[
+        str, typer.Option(help="fracture; or flow: spots and ribbons along the grain, as a mesh.")
+    ] = "fracture",
     least_radius: Annotated[
         float, typer.Option(metavar="M", help="Thinner wood has no cracks.")
     ] = 0.03,
@@ -102,7 +106,12 @@ def bark(
         raise InputError("nothing to write", where="--to", expected="a folder, a mesh or a .png")
     choices = _Choices(to, size, low, height, cell, kind, film, tile, force)
     choices.check()
+    if model not in ("fracture", "flow") or (model == "flow" and to.suffix.lower() not in MESH):
+        raise InputError(f"--model {model}", expected="fracture, or flow with --to NAME.glb")
     chosen = _tree(run_file, tree, parametric, year, seed)
+    if model == "flow":
+        _write_flow(chosen, preset, year, seed, choices)
+        return
     name = preset or usual_preset(chosen.skeleton.species)
     kept = Preset.load(name)
     if tile:
@@ -282,6 +291,26 @@ def _parts(grown: TreeBark, skeleton: Skeleton, choices: _Choices) -> Any:
     from forest.surface.tubes import tubes
 
     return dressed_parts(grown, tubes(skeleton), choices.size)
+
+
+def _write_flow(
+    chosen: _Chosen, preset: str | None, year: int | None, seed: int, choices: _Choices
+) -> None:
+    """Write the bark of Hart and Baker's section 5.4."""
+    from forest.errors import InputError
+    from forest.surface.export import write_mesh
+    from forest.surface.flow import features
+    from forest.surface.flow.presets import preset_for, preset_names
+
+    kept = preset or preset_for(chosen.skeleton.species)
+    if kept is None:
+        known = ", ".join(preset_names())
+        raise InputError(f"which bark has {chosen.name}?", where="--preset", expected=known)
+    age = _PARAMETRIC_AGE if chosen.wood is None else None
+    with working(f"flow bark on {chosen.name}"):
+        made = features(chosen.skeleton, kept, year=year, age=age, seed=seed)
+        write_mesh(made.parts(), choices.to, overwrite=choices.force)
+    typer.echo(f"{choices.to}: flow bark of {chosen.name}")
 
 
 def _write_maps(grown: TreeBark, choices: _Choices) -> None:

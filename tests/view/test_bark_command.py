@@ -82,6 +82,16 @@ def test_pictures_by_year_grow(run_file: Path, tmp_path: Path) -> None:
     assert 0 < (young < 250).sum() < (old < 250).sum()
 
 
+def test_flow_bark(run_file: Path, tmp_path: Path) -> None:
+    tree, _ = thick(run_file)
+    to = tmp_path / "flow.ply"
+    words = ("--tree", tree, "--model", "flow", "--preset", "maple", "--to", to)
+    code, out, err = forest("bark", run_file, *words)
+    assert code == 0, err
+    assert "flow bark" in out
+    assert to.stat().st_size > 1000
+
+
 def test_a_parametric_tree_and_a_tile(tmp_path: Path) -> None:
     to = tmp_path / "tile"
     words = ("bark", "--parametric", "quaking_aspen", "--tile", "--size", 256, "--to", to)
@@ -108,6 +118,7 @@ def test_a_parametric_tree_and_a_tile(tmp_path: Path) -> None:
         (("--parametric", "quaking_aspen", "--to", "x.png", "--cell", 0.1), "--cell"),
         (("--parametric", "quaking_aspen", "--to", "x", "--height", -1), "--height -1"),
         (("--parametric", "quaking_aspen", "--to", "x", "--year", 3), "for a run"),
+        (("--parametric", "quaking_aspen", "--to", "x", "--model", "flow"), "flow with --to"),
     ],
 )
 def test_bad_input_is_one_line(
