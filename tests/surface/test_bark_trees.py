@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -372,6 +373,14 @@ def test_refusals() -> None:
         bark_tree(pole(), preset, law="none")
     with pytest.raises(InputError, match="strips of no width"):
         lay_strips(pole(), 0.0)
+    with pytest.raises(InputError, match="no axis of a radius of .* m over 4 strips"):
+        lay_strips(pole(0.1, 1.0), 0.5)
+    for column in ("radius", "start", "end"):
+        values = getattr(pole(), column).copy()
+        values[3] = np.nan
+        stem = replace(pole(), **{column: values})
+        with pytest.raises(InputError, match=f"internode 3 of tree .* has a {column} that is no"):
+            bark_tree(stem, preset)
     with pytest.raises(InputError, match="no girth at 1990"):
         oak().at(1990)
     with pytest.raises(InputError, match="two or more"):

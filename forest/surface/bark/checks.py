@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.surface.bark.material import Material, fracture_range
+from forest.surface.bark.strips import StripGeometry
 
 
 def checked_girths(
@@ -40,6 +41,19 @@ class Spread(NamedTuple):
             return self.table
         spread: NDArray[np.float64] = self.table[step]
         return spread
+
+
+def check_strips(geometry: StripGeometry) -> None:
+    """Refuse strips whose width or place is no number, or whose width is not above 0."""
+    wide = np.isfinite(geometry.width) & (geometry.width > 0.0)
+    wide &= np.all(np.isfinite(geometry.width_around) & (geometry.width_around > 0.0), axis=1)
+    wide &= np.isfinite(geometry.along)
+    if not wide.all():
+        raise InputError(
+            f"strip {int(np.argmin(wide))} has no width or place",
+            where="bark: strips",
+            expected="metres, the width above 0",
+        )
 
 
 def checked_dilatation(table: NDArray[np.float64] | None, steps: int, strips: int) -> Spread:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from forest._threads import in_threads
 from forest.errors import InputError
 from forest.surface.bark.checks import (
+    check_strips,
     check_threshold,
     checked_dilatation,
     checked_girths,
@@ -146,6 +147,7 @@ class Bark:
         where = (np.int64(strip), np.int64(record), place, self.time)
         crossings = self.geometry.crossings
         begin_fracture(rings, physics, np.int64(self.seed), crossings, *where)
+        _keep_untorn(rings, self._rings)
         return _seen(self, rings, self.time)
 
     def refracture(
@@ -238,10 +240,11 @@ def grow_bark(
     Raises
     ------
     InputError
-        Shapes that do not fit, a girth that is not above 0 or shrinks, a threshold S below the
-        range of 3.2.3.
+        Shapes that do not fit, a strip without width, a girth that is not above 0 or shrinks, a
+        threshold S below the range of 3.2.3.
     """
     material = material or Material()
+    check_strips(geometry)
     strips = len(geometry.axis)
     girths = girths_from_birth(girth_by_step, strips)
     map_of = checked_weakness(weakness, strips)
@@ -290,6 +293,14 @@ def _advance(
     crossings = bark.geometry.crossings
     tear_all(rings, physics, np.int64(bark.seed), crossings, order, time)
     return rings
+
+
+def _keep_untorn(rings: Rings, before: Rings) -> None:
+    """Give strips that did not tear their springs back: they still lie at equilibrium."""
+    strip_of = np.searchsorted(rings.base, np.arange(len(rings.rest)), side="right") - 1
+    same = (rings.records == before.records)[strip_of]
+    for name in ("rest", "grip_left", "grip_right"):
+        getattr(rings, name)[same] = getattr(before, name)[same]
 
 
 def _stretched(
