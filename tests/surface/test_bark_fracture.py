@@ -336,3 +336,22 @@ def test_all_strips_lie_at_equilibrium_after_a_trigger(attachment: float) -> Non
     assert np.array_equal(
         after.elements.rest[~touched[strip_of(after)]], bark.elements.rest[untouched]
     )
+
+
+def test_plates_tear_where_the_girth_grows() -> None:
+    """A next generation stretches by sectors too, from where they lie on the surface that tore."""
+    spread = np.where(np.arange(8) < 4, 3.0, 1.0) * np.ones((12, 1))
+    girth = np.full(12, 1.2)
+    old = grow_bark(column(12), shrinking(girth * 0.8, 0.6), Material(), dilatation=spread)
+    wider = shrinking(girth, 0.8)[1:]
+    new = old.refracture(wider, dilatation=spread, substeps=2)
+    check(new)
+    assert np.array_equal(new._rings.edges[:, -1], girth)
+    begin, end = (b._rings.edges[:, 4] / b.strips.girth for b in (old, new))
+    assert (begin > 0.5).all() and (end > begin).all()
+    even = old.refracture(wider)
+    assert even._rings.edges[:, 4] / girth == pytest.approx(begin)
+    with pytest.raises(InputError, match="a table of"):
+        old.refracture(wider, dilatation=spread[:, :6])
+    with pytest.raises(InputError, match="a table of"):
+        even.grow(1.1 * girth[None], dilatation=spread[:, :2])

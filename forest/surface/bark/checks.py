@@ -56,17 +56,20 @@ def check_strips(geometry: StripGeometry) -> None:
         )
 
 
-def checked_dilatation(table: NDArray[np.float64] | None, steps: int, strips: int) -> Spread:
-    """Check a dilatation."""
+def checked_dilatation(
+    table: NDArray[np.float64] | None, steps: int, edges: NDArray[np.float64]
+) -> Spread:
+    """Check a dilatation of the sectors between some edges."""
     if table is None:
         return Spread(None)
+    strips, sectors = len(edges), edges.shape[1] - 1
     table = np.asarray(table, np.float64)
     shapes = ((strips,), (steps, strips))
-    if table.shape[:-1] not in shapes or table.shape[-1] < 1:
+    if table.shape[:-1] not in shapes or table.shape[-1] != sectors:
         raise InputError(
             f"a table of {table.shape}",
             where="bark: dilatation",
-            expected=f"({strips}, sectors) or ({steps}, {strips}, sectors)",
+            expected=f"({strips}, {sectors}) or ({steps}, {strips}, {sectors})",
         )
     if not np.all(np.isfinite(table) & (table >= 0.0)) or not np.all(table.sum(axis=-1) > 0.0):
         raise InputError(

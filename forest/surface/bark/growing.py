@@ -33,7 +33,7 @@ from forest.surface.bark.strips import (
     Tears,
 )
 from forest.surface.bark.tables import elements_of, tables_of
-from forest.surface.bark.whole import whole_rings
+from forest.surface.bark.whole import even_edges, whole_rings
 
 #: By how much the memory of a fast year fades in the next, where the threshold is the growth ratio:
 #: bark strained in a fast year does not break up all over in a slow one.
@@ -99,7 +99,7 @@ class Bark:
         """
         rings = copied(self._rings)
         girths = checked_girths(girth_by_step, len(rings.records), rings.girth)
-        spread = checked_dilatation(dilatation, len(girths), len(rings.records))
+        spread = checked_dilatation(dilatation, len(girths), rings.edges)
         check_threshold(self.material, np.vstack([rings.girth, girths]), rings.length, substeps)
         pace, history = self._pace.copy(), list(self.history)
         time = self.time
@@ -156,6 +156,8 @@ class Bark:
         *,
         material: Material | None = None,
         seed: int | None = None,
+        dilatation: NDArray[np.float64] | None = None,
+        substeps: int = 1,
         keep: bool = False,
     ) -> Bark:
         """Let the surface be the epidermis of another bark, weak where this one tore (figure 9).
@@ -166,6 +168,15 @@ class Bark:
             The girth from now on, m.
         material : Material, optional
             That of the next generation; the same unless given.
+        seed : int, optional
+            The next one unless given.
+        dilatation, substeps, keep
+            As in `grow`. The sectors lie where growth has taken them so far.
+
+        Raises
+        ------
+        InputError
+            As for `grow_bark`, or other sectors than those in which this bark grew unevenly.
         """
         material = material or self.material
         girth = self.strips.girth
@@ -175,14 +186,13 @@ class Bark:
             x = (np.arange(samples) + 0.5) * (girth[strip] / samples)
             rows, _ = self.elements.at(strip, x)
             weakness[strip] = self.elements.kind[rows] == FRACTURE
-        bark = grow_bark(
-            self.geometry,
-            np.vstack([girth, girth_by_step]),
-            material,
-            self.seed + 1 if seed is None else seed,
-            weakness=weakness,
-            keep=keep,
-        )
+        edges = self._rings.edges
+        if edges.shape[1] == 2:  # it grew evenly
+            edges = even_edges(girth, _sectors(dilatation))
+        seed = self.seed + 1 if seed is None else seed
+        girths = checked_girths(girth_by_step, len(girth), girth)
+        bark = _whole(self.geometry, girth, material, seed, edges, weakness)
+        bark = bark.grow(girths, dilatation=dilatation, substeps=substeps, keep=keep)
         generation = self.generation + 1
         marked = np.full(len(bark.fractures.origin), generation, np.int32)
         fractures = bark.fractures._replace(generation=marked)
@@ -248,12 +258,14 @@ def grow_bark(
     strips = len(geometry.axis)
     girths = girths_from_birth(girth_by_step, strips)
     map_of = checked_weakness(weakness, strips)
-    sectors = 1 if dilatation is None else np.shape(dilatation)[-1]
-    rings = whole_rings(geometry, girths[0], material, sectors)
-    physics = Physics.of(material)
-    in_threads(weigh_all, rings, physics, np.int64(seed), map_of)
-    bark = _first(geometry, material, seed, rings)
+    edges = even_edges(girths[0], _sectors(dilatation))
+    bark = _whole(geometry, girths[0], material, seed, edges, map_of)
     return bark.grow(girths[1:], dilatation=dilatation, substeps=substeps, keep=keep)
+
+
+def _sectors(dilatation: NDArray[np.float64] | None) -> int:
+    shape = np.shape(dilatation)
+    return shape[-1] if shape else 1
 
 
 class _Part(NamedTuple):
@@ -321,8 +333,17 @@ def _stretched(
     return stretched
 
 
-def _first(geometry: StripGeometry, material: Material, seed: int, rings: Rings) -> Bark:
+def _whole(
+    geometry: StripGeometry,
+    girth: NDArray[np.float64],
+    material: Material,
+    seed: int,
+    edges: NDArray[np.float64],
+    weakness: NDArray[np.float64],
+) -> Bark:
     """Give bark whose epidermis is whole."""
+    rings = whole_rings(geometry, girth, material, edges)
+    in_threads(weigh_all, rings, Physics.of(material), np.int64(seed), weakness)
     empty: Any = None
     bark = Bark(
         geometry=geometry._replace(crossings=_sorted(geometry.crossings)),

@@ -92,7 +92,10 @@ class _Stretch:
         last = bark
         if rows < len(self.first):
             last = bark.grow(self.first[rows:], dilatation=_rest(self.spread, rows))
-        torn = last.refracture(np.maximum(self.again[:rows], last.strips.girth))
+        # They begin at the first row: nothing grows in the step up to it.
+        if spread is not None:
+            spread = np.concatenate((np.ones((1, *spread.shape[1:])), spread))
+        torn = last.refracture(np.maximum(self.again[:rows], last.strips.girth), dilatation=spread)
         return replace(torn, surface=bark)
 
 
