@@ -257,6 +257,54 @@ def test_a_cone_and_an_ellipse() -> None:
     assert history.dilatation[0, 5].max() > 2.0 * spread.min()
 
 
+def bulged(factor: float) -> np.ndarray:
+    """Widen one side of a round stem."""
+    return 0.1 * (1.0 + factor * np.maximum(np.cos(EVEN), 0.0)) * np.ones((50, 1))
+
+
+def test_two_shapes_become_bark() -> None:
+    """Shapes linked by radial projection tear where the second one bulges."""
+    stem = pole(0.1, 1.0, 10)
+    tree = lay_strips(stem, STRIP)
+    history = linked_girths(tree, [bulged(0.0), 1.05 * bulged(0.0), 1.2 * bulged(1.0)])
+    grown = bark_tree(stem, Preset.load("oak"), 1, history=history, law="conserved", strip_m=STRIP)
+    assert grown.time == 2.0
+    assert widths_of(grown) == pytest.approx(perimeter(1.2 * bulged(1.0)))
+    e = grown.bark.elements
+    strip = np.repeat(np.arange(50), np.diff(e.offsets))
+    rows = e.kind == FRACTURE
+    turn = (e.start + 0.5 * e.width)[rows] / grown.bark.strips.girth[strip[rows]]
+    opened = e.width[rows] * (np.cos(2.0 * np.pi * turn) > 0.0)
+    assert opened.sum() > 0.6 * e.width[rows].sum()
+    assert grown.at(1.0).bark.elements.width.sum() < e.width.sum()
+    assert grown.maps(64)[0].width_m == pytest.approx(history.girth[-1].mean())
+    meshes = linked_girths(tree, [cone(0.1, 0.1), cone(0.2, 0.18)])
+    by_preset = bark_tree(stem, Preset.load("oak"), 1, history=meshes, strip_m=STRIP)
+    assert len(by_preset.bark.tears.strip) > 20
+    assert widths_of(by_preset) == pytest.approx(meshes.girth[-1])
+
+
+def test_a_history_that_does_not_fit_is_refused() -> None:
+    stem, oak_bark = pole(), Preset.load("oak")
+    tree = lay_strips(stem, STRIP)
+    history = linked_girths(tree, [bulged(0.0), bulged(0.5)])
+    with pytest.raises(InputError, match="beside wood"):
+        bark_tree(stem, oak_bark, history=history, wood=wood_of(stem), strip_m=STRIP)
+    with pytest.raises(InputError, match="girths of"):
+        bark_tree(stem, oak_bark, history=history, strip_m=0.1)
+    spread = history.dilatation
+    assert spread is not None
+    for wrong, message in (
+        (history._replace(times=np.array([1.0, 1.0])), "do not rise"),
+        (history._replace(dilatation=spread[:, :9]), "dilatation of"),
+        (history._replace(girth=history.girth * [[1.0], [np.nan]]), "no girth at the end"),
+    ):
+        with pytest.raises(InputError, match=message):
+            bark_tree(stem, oak_bark, history=wrong, strip_m=STRIP)
+    with pytest.raises(InputError, match="no outline"):
+        linked_girths(tree, [bulged(0.0), bulged(0.5)[:, :50]])
+
+
 def test_cracks_only_widen() -> None:
     """Time goes on without jumps: what is torn stays, at its place, and opens (shares of turns)."""
     grown = oak()

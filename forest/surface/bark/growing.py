@@ -264,7 +264,7 @@ def grow_bark(
 
 
 def _sectors(dilatation: NDArray[np.float64] | None) -> int:
-    shape = np.shape(dilatation)
+    shape = () if dilatation is None else np.shape(dilatation)
     return shape[-1] if shape else 1
 
 

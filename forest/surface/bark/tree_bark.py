@@ -13,6 +13,7 @@ from forest.surface.bark.axes import LEAST_RADIUS_M, BarkedTree, lay_strips
 from forest.surface.bark.dressing import Dress, Fold
 from forest.surface.bark.girth import (
     GirthHistory,
+    checked_history,
     present_girths,
     recorded_girths,
     supposed_girths,
@@ -255,6 +256,7 @@ def bark_tree(
     seed: int = 0,
     *,
     wood: YearlyWood | None = None,
+    history: GirthHistory | None = None,
     shrink: bool = False,
     law: str = "preset",
     flare: Flare | None = None,
@@ -276,6 +278,10 @@ def bark_tree(
     wood : YearlyWood, optional
         Its radii of all years (`forest.record.wood.yearly_wood`): they drive the growth. Without
         them every ring is taken to have been as wide.
+    history : GirthHistory, optional
+        Girths of your own instead, of the strips that `lay_strips` gives for the same skeleton,
+        `strip_m` and `least_radius_m`: those of shapes linked by radial projection
+        (`forest.surface.bark.girth.linked_girths`).
     shrink : bool
         Shrink the epidermis of the finished tree instead; nothing but its shape counts.
     law : str
@@ -300,12 +306,21 @@ def bark_tree(
     Raises
     ------
     InputError
-        No wood is so thick, or a parameter is out of its range.
+        No wood is so thick, a parameter is out of its range, or a history does not fit the strips
+        or stands beside wood, a root flare or shrinking.
     """
     if law not in LAWS:
         raise InputError(f"law '{law}'", where="bark", expected=" or ".join(LAWS))
     tree = lay_strips(skeleton, strip_m or preset.tearing.strip_m, least_radius_m=least_radius_m)
-    girth = present_girths(tree)
+    if history is not None:
+        if wood is not None or flare is not None or shrink:
+            raise InputError(
+                "girths of your own beside wood, a flare or shrinking",
+                where="bark: history",
+                expected="one of them",
+            )
+        history = checked_history(history, len(tree.geometry.axis))
+    girth = present_girths(tree) if history is None else history.girth[-1]
     if shrink:
         steps = np.arange(_STEPS + 1.0)
         history = GirthHistory(steps, np.tile(girth, (_STEPS + 1, 1)), None)
@@ -313,7 +328,7 @@ def bark_tree(
     else:
         if wood is not None:
             history = recorded_girths(tree, wood, flare=flare)
-        else:
+        elif history is None:
             history = supposed_girths(tree, years)
         of_law = _Stretch.conserved(history) if law == "conserved" else None
         stretch = of_law or _Stretch.by_preset(history, preset)
