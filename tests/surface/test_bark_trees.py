@@ -327,6 +327,22 @@ def test_cracks_only_widen() -> None:
     assert np.array_equal(last.elements.width, now.elements.width)
 
 
+def test_bark_of_an_earlier_time_is_to_look_at() -> None:
+    """Widths are drawn at that time's scale; the epidermis stays as long as it is, to the bit."""
+    moment = oak().at(2006)
+    bark, cut = moment.bark, moment.piece(0, 0.5, 1.0)
+    assert not hasattr(bark, "grow") and not hasattr(cut, "trigger")
+    assert bark.scale.max() < 1.0 and (oak().bark.scale == 1.0).all()
+    for view in (bark, cut):
+        e = view.elements
+        own = np.where(e.kind == FRACTURE, 0.0, e.rest)
+        assert np.array_equal(np.add.reduceat(own, e.offsets[:-1]), view.strips.rest)
+        assert np.add.reduceat(e.width, e.offsets[:-1]) == pytest.approx(view.strips.girth)
+    assert np.array_equal(bark.strips.rest, oak().bark.strips.rest)
+    began = cut.fractures.origin
+    assert (cut.tears.fracture[began[began >= 0]] == np.flatnonzero(began >= 0)).all()
+
+
 def test_same_bits_again() -> None:
     one, two = oak(), oak.__wrapped__()
     for a, b in zip(one.bark.elements, two.bark.elements, strict=True):

@@ -27,12 +27,10 @@ from forest.surface.bark.strips import (
     FRACTURE,
     Crossings,
     Elements,
-    Fractures,
     StripGeometry,
-    Strips,
-    Tears,
 )
 from forest.surface.bark.tables import elements_of, tables_of
+from forest.surface.bark.viewed import BarkView
 from forest.surface.bark.whole import even_edges, whole_rings
 
 #: By how much the memory of a fast year fades in the next, where the threshold is the growth ratio:
@@ -49,7 +47,7 @@ class Snapshot(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Bark:
+class Bark(BarkView):
     """Bark at one time. Its verbs give another bark; this one stays as it is.
 
     Memory: 49 bytes an element (two to a fracture), and inside 136 bytes a possible fracture (one
@@ -57,18 +55,7 @@ class Bark:
     """
 
     geometry: StripGeometry
-    material: Material
-    seed: int
-    strips: Strips
-    elements: Elements
-    tears: Tears
-    fractures: Fractures
-    time: float  # steps since the epidermis was whole
     history: tuple[Snapshot, ...]  # one a step, where asked for
-    generation: int  # 0; 1 where the surface of another bark tore, ...
-    surface: (
-        Bark | None
-    )  # that other bark: this one's place x on the epidermis is x around its girth
     _rings: Rings
     _pace: NDArray[np.float64]  # (strips) S - 1 where S is the growth ratio
 
@@ -357,6 +344,7 @@ def _whole(
         history=(),
         generation=0,
         surface=None,
+        scale=np.ones(len(rings.girth)),
         _rings=rings,
         _pace=np.zeros(len(rings.girth)),
     )

@@ -24,6 +24,7 @@ from forest.surface.bark.material import Material
 from forest.surface.bark.piece import piece_of, rescaled
 from forest.surface.bark.presets import Preset, at_girth
 from forest.surface.bark.shrinking import shrinking
+from forest.surface.bark.viewed import BarkView
 from forest.surface.blend.foot import Flare
 from forest.trees.skeleton import Skeleton
 
@@ -127,8 +128,8 @@ class TreeBark:
     ----------
     tree : BarkedTree
         Its axes and strips.
-    bark : Bark
-        Strips, elements, fractures; all in m, sizes as they are at this time.
+    bark : BarkView
+        Strips, elements, fractures; all in m, sizes around the girth as they are at this time.
     preset : Preset
         What it looks like.
     seed : int
@@ -137,7 +138,7 @@ class TreeBark:
     """
 
     tree: BarkedTree
-    bark: Bark
+    bark: BarkView
     preset: Preset
     seed: int
     history: GirthHistory
@@ -162,7 +163,9 @@ class TreeBark:
             self.tree, self.preset, self.seed, history, self._stretch, self._material, row
         )
 
-    def piece(self, axis: int = 0, low_m: float | None = None, high_m: float | None = None) -> Bark:
+    def piece(
+        self, axis: int = 0, low_m: float | None = None, high_m: float | None = None
+    ) -> BarkView:
         """Give the bark of a part of an axis, from `low_m` to `high_m` along it.
 
         Raises
@@ -348,5 +351,6 @@ def _grown(
 ) -> TreeBark:
     bark = stretch.grown(tree, material, seed, row)
     now = history.girth[-1]
-    sized = rescaled(bark, np.where(np.isnan(now), bark.strips.girth, now))
+    girth = bark.strips.girth
+    sized = rescaled(bark, np.where(np.isnan(now), girth, now) / girth)
     return TreeBark(tree, sized, preset, seed, history, stretch, material)
