@@ -180,13 +180,9 @@ def test_a_surface_left_open_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_limbs_that_touch_without_crossing_are_told() -> None:
-    ring = 0.4 * np.array([(np.sin(a), 0.0, 1.0 - np.cos(a)) for a in np.linspace(0.0, 6.2, 13)])
-    loop = tree(
-        list(range(-1, 12)),
-        [(0.0, 0.0, -0.5), *(tuple(map(float, p)) for p in ring)],
-        [0.05] * 13,
-        [True] * 13,
-    )
+    turns = np.linspace(0.0, 6.2, 13)
+    ring = [(0.4 * float(np.sin(a)), 0.0, 0.4 - 0.4 * float(np.cos(a))) for a in turns]
+    loop = tree(list(range(-1, 12)), [(0.0, 0.0, -0.5), *ring], [0.05] * 13, [True] * 13)
     with pytest.warns(CrossingWarning, match="a handle, though no axes cross"):
         mesh = blended(loop, cell_m=0.025, flare=None)
     assert mesh.is_watertight and mesh.genus().tolist() == [1]
