@@ -133,12 +133,13 @@ def simulate(
 
 def _with_meshes(run: Run, observer: Observer) -> Run:
     """Write the surfaces of a finished run's sample trees, if the scenario asks for them."""
-    form = run.scenario.output.sample_trees.meshes
+    wanted = run.scenario.output.sample_trees
+    form = wanted.meshes
     if form is not None and run.samples:
         from forest.view.tree_mesh import write_samples
 
         observer.say(f"writing the surfaces of {len(run.samples)} sample trees")
-        folder = write_samples(run, f".{form}")[0].parent
+        folder = write_samples(run, f".{form}", bark=wanted.bark)[0].parent
         observer.say(f"{folder} holds them")
     return run
 
@@ -244,7 +245,7 @@ def _so_far(scenario: Scenario, years_done: int) -> dict[str, Any]:
         climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]
     del content["years"], content["planned_years"]
     samples = content["output"]["sample_trees"]
-    del samples["meshes"]
+    del samples["meshes"], samples["bark"]
     if samples["at_year"] == scenario.calendar[-1] or samples["at_year"] not in done:
         samples["at_year"] = None
     return content

@@ -12,6 +12,7 @@ from typing import Any
 
 import typer
 
+from forest.cli.barking import bark
 from forest.cli.describing import species, version
 from forest.cli.exporting import export
 from forest.cli.growing import check, run, sweep
@@ -55,6 +56,7 @@ for _command in (
     info,
     export,
     mesh,
+    bark,
     species,
     picture,
     stand_view,

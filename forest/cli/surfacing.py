@@ -74,7 +74,7 @@ def mesh(
     if kind not in _KINDS:
         raise InputError(f"unknown kind '{kind}', {nearest(kind, _KINDS)}")
     with open_run(run_file) as run:
-        _check_sample(run, tree)
+        check_sample(run, tree)
         at = int(run.sample_years(tree)[-1]) if year is None else year
         skeleton = run.skeleton(tree, at)
         species = species_of(run, skeleton)
@@ -123,7 +123,7 @@ def _surface(skeleton: Skeleton, kind: str, cell: float | None, tolerance: float
     return blended(skeleton, cell_m=cell)
 
 
-def _check_sample(run: Any, tree: int) -> None:
+def check_sample(run: Any, tree: int) -> None:
     from forest.errors import InputError
 
     if tree not in run.samples:

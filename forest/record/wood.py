@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from forest.dendro.turns import shortest_turn, unit
 from forest.errors import InputError
 from forest.measure.stem import stem_path
 from forest.record.identity import damage_reported
+from forest.trees.skeleton import Skeleton
 
 if TYPE_CHECKING:
     import h5py
@@ -103,6 +105,34 @@ def stem_life(run: Run, tree_id: int, year: int | None) -> StemLife:
         ),
         bark_factor=_bark_factor(run, skeleton.species),
     )
+
+
+@dataclass(frozen=True)
+class YearlyWood:
+    """The wood of all internodes that a sample tree has in a year, in the years up to it.
+
+    Attributes
+    ----------
+    years : int64 (Y,)
+        Calendar years on record.
+    radius : float64 (Y, n)
+        Under bark at the end of each year, m; 0 before an internode was made.
+    eccentricity, thick_side_deg : float64 (Y, n)
+        Of each year's ring; the azimuth once the internode is upright, 0 for a round ring.
+    """
+
+    years: NDArray[np.int64]
+    radius: NDArray[np.float64]
+    eccentricity: NDArray[np.float64]
+    thick_side_deg: NDArray[np.float64]
+
+
+def yearly_wood(run: Run, skeleton: Skeleton, year: int) -> YearlyWood:
+    """Read the radii of the internodes of `run.skeleton(tree, year)` up to that year."""
+    with damage_reported(run.path):
+        group = run.sample_group(skeleton.tree_id)
+        lives = _Lives(group, skeleton.serial, skeleton.end, year)
+    return YearlyWood(lives.years, lives.radius, lives.eccentricity, lives.thick_side_deg)
 
 
 class _Lives:

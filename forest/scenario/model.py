@@ -375,6 +375,17 @@ class SampleTrees(Table):
         "last year, into the folder RUN_meshes beside the run file",
         unit="",
     )
+    bark: bool = quantity(
+        False,
+        "whether these surfaces have bark that tears as the tree grew; needs `meshes`",
+        unit="",
+    )
+
+    @model_validator(mode="after")
+    def _bark_has_meshes(self) -> SampleTrees:
+        if self.bark and self.meshes is None:
+            raise Refusal("true", key="bark", expected='meshes = "glb" beside it')
+        return self
 
 
 class Output(Table):

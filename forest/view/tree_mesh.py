@@ -8,7 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from forest.record.run import Run
+from forest.record.wood import yearly_wood
 from forest.species import Species
+from forest.surface.bark.axes import LEAST_RADIUS_M
+from forest.surface.bark.bark_mesh import dressed_parts
+from forest.surface.bark.presets import Preset
+from forest.surface.bark.tree_bark import bark_tree
+from forest.surface.bark.usual import usual_preset
 from forest.surface.export import Material, Part, leaf_parts, write_mesh
 from forest.surface.mesh import Mesh
 from forest.surface.tubes import tubes
@@ -55,7 +61,7 @@ def tree_parts(wood: Mesh, skeleton: Skeleton, leaves: Leaves | None) -> list[Pa
     return parts
 
 
-def write_samples(run: Run, suffix: str) -> list[Path]:
+def write_samples(run: Run, suffix: str, *, bark: bool = False) -> list[Path]:
     """Write tubes of all sample trees of a run, each as it was in its last year on record.
 
     Parameters
@@ -64,6 +70,8 @@ def write_samples(run: Run, suffix: str) -> list[Path]:
         The run, finished or not.
     suffix : str
         Format, one of `forest.surface.export.SUFFIXES`.
+    bark : bool
+        Whether trees that are thick enough have bark with maps (`barked_parts`).
 
     Returns
     -------
@@ -79,9 +87,27 @@ def write_samples(run: Run, suffix: str) -> list[Path]:
         skeleton = run.skeleton(tree_id, year)
         to = folder / f"tree_{tree_id}_{year}{suffix}"
         leaves = leaves_of(skeleton, species_of(run, skeleton)) if with_leaves(to) else None
-        parts = tree_parts(tubes(skeleton), skeleton, leaves)
+        wood = tubes(skeleton)
+        parts = tree_parts(wood, skeleton, leaves)
+        if bark and skeleton.radius.max() >= LEAST_RADIUS_M:
+            parts[:1] = barked_parts(run, skeleton, year, wood)
         written.append(write_mesh(parts, to, overwrite=True))
     return written
+
+
+def barked_parts(
+    run: Run,
+    skeleton: Skeleton,
+    year: int,
+    wood: Mesh,
+    *,
+    least_radius_m: float = LEAST_RADIUS_M,
+) -> list[Part]:
+    """Put the usual bark of a sample tree's species on its wood, torn as the tree grew."""
+    preset = Preset.load(usual_preset(skeleton.species))
+    rings = yearly_wood(run, skeleton, year)
+    grown = bark_tree(skeleton, preset, 1, wood=rings, least_radius_m=least_radius_m)
+    return dressed_parts(grown, wood)
 
 
 def meshes_folder(run_file: Path) -> Path:
