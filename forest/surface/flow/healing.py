@@ -409,8 +409,8 @@ def heal(
     spacing_m : float, optional
         Distance of particles, m; by default a fifth of the wound's radius.
     reach_m : float, optional
-        How far around the wound, or what has grown over it, the surface is covered, m; by default three of its radii and as
-        far as the stub stands out.
+        How far around the wound, or what has grown over it, the surface is covered, m; by
+        default three of its radii and as far as the stub stands out.
     seed : int
         Of the random numbers of splits.
 
