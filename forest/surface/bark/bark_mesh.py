@@ -167,7 +167,8 @@ def _corners(turn: _Floats, share: _Floats) -> _Floats:
     """
     known = np.argmax(~np.isnan(turn), axis=1)
     turn = turn - np.round(turn - turn[np.arange(len(turn)), known][:, None])
-    between = np.nanmean(np.where(np.isnan(turn).all(axis=1)[:, None], 0.0, turn), axis=1)
+    unknown = np.all(np.isnan(turn), axis=1, keepdims=True)
+    between = np.nanmean(np.where(unknown, 0.0, turn), axis=1)
     turn = np.where(np.isnan(turn), between[:, None], turn)
     return np.stack((turn, share), axis=-1)
 
