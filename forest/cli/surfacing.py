@@ -67,7 +67,7 @@ def mesh(
     from forest.errors import InputError, nearest
     from forest.record.run import open_run
     from forest.trees.leaves import leaves_of
-    from forest.view.tree_mesh import species_of, tree_parts, with_leaves
+    from forest.view.tree_mesh import species_of, too_thin, tree_parts, with_leaves
 
     check_targets((to, (*MESH, ".png")), force=force)
     if kind not in _KINDS:
@@ -78,10 +78,13 @@ def mesh(
         skeleton = run.skeleton(tree, at)
         species = species_of(run, skeleton)
     with working(f"the surface of {len(skeleton):,} internodes"):
-        wood = _surface(skeleton, kind, cell, tolerance)
+        thin = kind == "blended" and cell is None and too_thin(skeleton)
+        wood = _surface(skeleton, "tubes" if thin else kind, cell, tolerance)
         cards = leaves_of(skeleton, species) if with_leaves(to, leaves) else None
         parts = tree_parts(wood, skeleton, cards)
     write_parts(parts, to, colour, force)
+    if thin:
+        typer.echo(f"tree {tree} is too thin to blend without --cell: tubes", err=True)
     triangles = sum(len(part.mesh.triangles) for part in parts)
     typer.echo(f"{to}: {triangles:,} triangles, tree {tree} in {at}, {wood.volume:.4g} m3 of wood")
 

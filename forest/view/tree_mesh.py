@@ -15,6 +15,7 @@ from forest.surface.bark.bark_mesh import dressed_parts
 from forest.surface.bark.presets import Preset
 from forest.surface.bark.tree_bark import bark_tree
 from forest.surface.bark.usual import usual_preset
+from forest.surface.blend.whole import THINNEST, usual_cell
 from forest.surface.export import Material, Part, leaf_parts, write_mesh
 from forest.surface.mesh import Mesh
 from forest.surface.tubes import tubes
@@ -59,6 +60,11 @@ def tree_parts(wood: Mesh, skeleton: Skeleton, leaves: Leaves | None) -> list[Pa
     if leaves is not None:
         parts += leaf_parts(leaves, tree_id=skeleton.tree_id, colour=linear(look.leaf))
     return parts
+
+
+def too_thin(skeleton: Skeleton) -> bool:
+    """Tell whether usual cells are too large to blend a tree: a seedling of a few mm."""
+    return float(skeleton.radius.max()) < THINNEST * usual_cell(skeleton)
 
 
 def write_samples(run: Run, suffix: str, *, bark: bool = False) -> list[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ import trimesh
 from PIL import Image
 
 from forest.errors import InputError
+from forest.record.run import Run
 from forest.simulation import simulate
 from forest.surface.export import Material, Part, leaf_parts
 from forest.surface.tubes import tubes
 from forest.trees.leaves import leaves_of
+from forest.trees.skeleton import Skeleton
 from forest.view.surface_picture import draw_mesh
 from forest.view.tree_mesh import species_of
 from tests.surface.bushes import bush
@@ -64,6 +67,27 @@ def test_the_command_writes_a_sample_tree(run_file: Path, tmp_path: Path, suffix
         assert bare.is_watertight
         forest("mesh", run_file, "--tree", "1", "--to", green, "--leaves")
         assert len(trimesh.load(green, process=False).faces) > len(bare.faces)
+
+
+def test_a_seedling_is_written_as_tubes(
+    run_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grown = Run.skeleton
+
+    def seedling(run: Run, tree_id: int, year: int) -> Skeleton:
+        tree = grown(run, tree_id, year)
+        return replace(tree, radius=np.float32(0.0019) / tree.radius.max() * tree.radius)
+
+    monkeypatch.setattr(Run, "skeleton", seedling)
+    blended, plain = tmp_path / "a.ply", tmp_path / "b.ply"
+    words = ("mesh", run_file, "--tree", "4", "--year", "2001", "--to")
+    code, _, err = forest(*words, blended)
+    assert (code, err) == (0, "tree 4 is too thin to blend without --cell: tubes\n")
+    assert forest(*words, plain, "--kind", "tubes")[::2] == (0, "")
+    assert blended.read_bytes() == plain.read_bytes()
+    code, _, err = forest(*words, blended, "--force", "--cell", "0.01")
+    assert code == 2
+    assert "the thickest internode has a radius" in err
 
 
 @pytest.mark.parametrize(
