@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ import trimesh
 from PIL import Image
 
 from forest.errors import InputError
-from forest.record.run import Run
+from forest.record.run import Run, open_run
 from forest.simulation import simulate
+from forest.surface.blend import blended, reaction_wood
 from forest.surface.export import Material, Part, leaf_parts
 from forest.surface.tubes import tubes
 from forest.trees.leaves import leaves_of
@@ -35,8 +37,6 @@ def _pixels(to: Path) -> np.ndarray:
 
 
 def test_meshes_of_sample_trees_are_written_at_the_end(run_file: Path) -> None:
-    from forest import open_run
-
     with open_run(run_file) as run:
         years = {tree_id: int(run.sample_years(tree_id)[-1]) for tree_id in run.samples}
     folder = run_file.with_name("tiny_meshes")
@@ -90,11 +90,44 @@ def test_a_seedling_is_written_as_tubes(
     assert "the thickest internode has a radius" in err
 
 
+def test_the_command_blends_as_it_is_told(
+    run_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each option reaches the mesh: it is the one that Python makes with the same words."""
+    grown = Run.skeleton
+
+    def large(run: Run, tree_id: int, year: int) -> Skeleton:  # enough for a root flare
+        tree = grown(run, tree_id, year)
+        return replace(tree, start=4 * tree.start, end=4 * tree.end, radius=4 * tree.radius)
+
+    monkeypatch.setattr(Run, "skeleton", large)
+    with open_run(run_file) as run:
+        tree = run.skeleton(1, 2004)
+        wood = reaction_wood(tree, species_of(run, tree))
+    said: list[tuple[tuple[str, ...], dict[str, Any]]] = [
+        ((), {}),
+        (("--reaction",), {"reaction": wood}),
+        (("--no-flare",), {"flare": None}),
+        (("--readings", "paper"), {"readings": "paper"}),
+    ]
+    to, volumes = tmp_path / "tree.ply", set()
+    for words, same in said:
+        given = ("--year", "2004", "--cell", "0.012", "--to", to, "--force", *words)
+        assert forest("mesh", run_file, "--tree", "1", *given)[0] == 0
+        volume = trimesh.load(to).volume
+        assert volume == pytest.approx(blended(tree, cell_m=0.012, **same).volume, rel=1e-6)
+        volumes.add(round(volume, 8))
+    assert len(volumes) == len(said), volumes
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("--tree", "9999", "--to", "x.glb"), "tree 9999 is no sample tree; expected one of its"),
         (("--tree", "1", "--to", "x.glb", "--kind", "tube"), "did you mean 'tubes'?"),
+        (("--tree", "1", "--to", "x.glb", "--readings", "papr"), "did you mean 'paper'?"),
+        (("--tree", "1", "--to", "x.glb", "--kind", "tubes", "--reaction"), "--reaction: tubes"),
+        (("--tree", "1", "--to", "x.glb", "--kind", "tubes", "--cell", "1"), "--cell: tubes"),
         (("--tree", "1", "--to", "x.stl"), "unknown format '.stl'"),
         (("--tree", "1", "--to", "x.glb", "--year", "1900"), "not on record in 1900"),
         (("--tree", "1", "--to", "x.png", "--colour", "radius"), "did you mean 'radius_m'?"),
@@ -115,8 +148,6 @@ def test_the_command_refuses(
 
 
 def test_a_tree_without_cards_is_left_by_colouring(run_file: Path, tmp_path: Path) -> None:
-    from forest import open_run
-
     with open_run(run_file) as run:
         skeleton = run.skeleton(1, 2008)
         leaves = leaves_of(skeleton, species_of(run, skeleton))
