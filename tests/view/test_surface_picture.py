@@ -16,9 +16,11 @@ from forest.record.run import Run, open_run
 from forest.simulation import simulate
 from forest.surface.blend import blended, reaction_wood
 from forest.surface.export import Material, Part, leaf_parts
+from forest.surface.mesh import Mesh
 from forest.surface.tubes import tubes
 from forest.trees.leaves import leaves_of
 from forest.trees.skeleton import Skeleton
+from forest.view import tree_mesh
 from forest.view.surface_picture import draw_mesh
 from forest.view.tree_mesh import species_of
 from tests.surface.bushes import bush
@@ -51,6 +53,30 @@ def test_a_resumed_run_may_ask_for_other_meshes(tmp_path: Path) -> None:
     assert not (tmp_path / "run_meshes").exists()
     simulate(tiny("years=4", "output.sample_trees.meshes=vtp"), to, resume=True).close()
     assert all(p.suffix == ".vtp" for p in (tmp_path / "run_meshes").iterdir())
+
+
+def test_meshes_at_the_end_may_be_blended(
+    run_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tree that cannot be is written as tubes, and the others are written all the same."""
+    whole = tree_mesh.blended
+    refused = 4
+
+    def blend(skeleton: Skeleton) -> Mesh:
+        if skeleton.tree_id == refused:
+            raise InputError("no memory")
+        return whole(skeleton, cell_m=0.005)
+
+    monkeypatch.setattr(tree_mesh, "blended", blend)
+    said: list[str] = []
+    with open_run(run_file) as run:
+        run.path = tmp_path / "run.h5"
+        files = tree_mesh.write_samples(run, ".ply", surface="blended", say=said.append)
+        assert len(files) == len(run.samples)
+    assert said == ["tree 4 is written as tubes: no memory"]
+    for to in files:
+        pieces = trimesh.load(to).body_count
+        assert (pieces > 1) == (f"tree_{refused}_" in to.name)
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".obj", ".ply", ".vtp", ".png"])
