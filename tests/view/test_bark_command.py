@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from forest.errors import InputError
 from forest.record.run import open_run
 from forest.surface.bark.axes import LEAST_RADIUS_M
 from forest.surface.tubes import tubes
+from forest.view import tree_mesh
 from forest.view.tree_mesh import barked_parts
 from tests.tiny import forest, tiny
 
@@ -139,12 +141,14 @@ def test_an_unknown_tree_or_none(run_file: Path, tmp_path: Path) -> None:
         assert says in err
 
 
-@pytest.mark.parametrize("surface", ["tubes", "blended"])
-def test_meshes_at_the_end_of_a_run_have_bark(tmp_path: Path, surface: str) -> None:
+def test_meshes_at_the_end_of_a_run_have_bark(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Trees thick enough do; others have plain wood."""
+    small = partial(tree_mesh.dressed_parts, size=256)  # pixels: large maps take long
+    monkeypatch.setattr(tree_mesh, "dressed_parts", small)
     samples = "output.sample_trees"
-    asked = tiny(f"{samples}.meshes=obj", f"{samples}.bark=true", f"{samples}.surface={surface}")
-    simulate(asked, tmp_path / "run.h5").close()
+    simulate(tiny(f"{samples}.meshes=obj", f"{samples}.bark=true"), tmp_path / "run.h5").close()
     barked = {
         int(to.name.split("_")[1]): "usemtl bark_0" in to.read_text()
         for to in (tmp_path / "run_meshes").glob("*.obj")
