@@ -7,6 +7,7 @@ calls, so that the runs that follow, and test processes that start at once, find
 from __future__ import annotations
 
 import time
+import warnings
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from forest.scenario import Scenario
 from forest.stand import Stand
 from forest.surface import Camera, Instances, Model, prepare, scene_shadow
 from forest.surface.bark import Material, StripGeometry, grow_bark
+from forest.surface.blend import CrossingWarning, blended
 from forest.surface.detail import SEASONS
 
 _YEARS = 3
@@ -67,6 +69,13 @@ def _tear() -> None:
     grow_bark(StripGeometry.column(3, 0.02), girth, Material(threshold=2.0)).trigger(1, 0.05)
 
 
+def _skin(tree: ParametricTree) -> None:
+    """Give a tree its blended surface, in cells that leave twigs to tubes."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CrossingWarning)
+        blended(tree.skeleton())
+
+
 def main() -> None:
     """Grow the tiny stands and a shrub, look at it, and say how long each took."""
     stand = Scenario.from_toml(_STAND, where="forest.warm")
@@ -78,10 +87,11 @@ def main() -> None:
             grown.step()
         print(f"{time.perf_counter() - start:.1f} s", flush=True)
     start = time.perf_counter()
-    print("kernels: parametric trees, views ... ", end="", flush=True)
+    print("kernels: parametric trees, views, surfaces ... ", end="", flush=True)
     tree = grow("lilac")
     tree.swayed(1.0, 1.0)
     _view(tree)
+    _skin(tree)
     print(f"{time.perf_counter() - start:.1f} s", flush=True)
     start = time.perf_counter()
     print("kernels: bark ... ", end="", flush=True)

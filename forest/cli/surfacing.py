@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +12,7 @@ import typer
 from forest.cli.shared import RunFile, check_targets
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from forest.species import Species
     from forest.surface.export import Part
@@ -134,11 +135,17 @@ def write_parts(parts: Sequence[Part], to: Path, colour: str, force: bool) -> No
         write_mesh(parts, to, overwrite=force)
 
 
-def working(what: str) -> Any:
-    """Show on a terminal what is being done, while it is."""
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Show on a terminal what is being done, while it is, and that kernels must be compiled."""
     from rich.console import Console
 
-    return Console(stderr=True).status(what)
+    from forest._jit import announce_compiling
+
+    with Console(stderr=True).status(what) as status:
+        compiling = f"{what}; compiling kernels that this machine has not run yet (up to a minute)"
+        with announce_compiling(lambda: status.update(compiling)):
+            yield
 
 
 @dataclass(frozen=True)

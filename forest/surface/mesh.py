@@ -112,6 +112,10 @@ class Mesh:
         ways = np.add.reduceat(np.where(turned, -1, 1), first) if len(first) else first
         return np.asarray((count == 2) & (ways == 0), np.bool_)
 
+    def edges(self) -> NDArray[np.int64]:
+        """Points at the ends of each edge, (e, 2), in the order of `edges_with_two_faces`."""
+        return np.column_stack(np.divmod(np.unique(self._edges()[0]), max(len(self.points), 1)))
+
     def components(self) -> NDArray[np.int32]:
         """Number the connected parts, from 0: the part of each triangle, (m,)."""
         a, b, _ = self.triangles.T

@@ -145,7 +145,8 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield from _frame_lines(result["frames"])
     yield from _scene_lines(result["scene"])
     skin = result["surfaces"]
-    yield Line(f"Surfaces of a tree of {skin['metamers']:,} internodes", ())
+    whole = f"{skin['metamers']:,} internodes, {skin['height_m']:.0f} m tall"
+    yield Line(f"Surfaces of a tree of {whole}", ())
     tubes = f"tubes, {skin['tube_triangles']:,} triangles, s"
     yield Line(tubes, (f"{skin['tubes_s']:.2f}", f"{skin['tubes_cpu_s']:.2f}"))
     whole = f"blended, cells of 1 cm, {skin['blended_triangles']:,} triangles, s"

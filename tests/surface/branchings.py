@@ -38,13 +38,12 @@ def stem(radius: float = 0.1, length: float = 1.0) -> Skeleton:
     return tree([-1], [(0, 0, 0), (0, 0, length)], [radius], [True])
 
 
-def branching(angle_deg: float = 45.0, thin: float = 0.06) -> Skeleton:
-    """Make a trunk, 20 cm thick, and a limb from its middle."""
+def branching(angle_deg: float = 45.0, thin: float = 0.06, half: float = 1.0) -> Skeleton:
+    """Make a trunk, 20 cm thick and twice `half` long, and a limb from its middle."""
     a = np.deg2rad(angle_deg)
-    limb = (1.2 * np.sin(a), 0.0, 1.0 + 1.2 * np.cos(a))
-    return tree(
-        [-1, 0, 0], [(0, 0, 0), (0, 0, 1), (0, 0, 2), limb], [0.1, 0.1, thin], [True, True, False]
-    )
+    limb = (1.2 * half * np.sin(a), 0.0, half + 1.2 * half * np.cos(a))
+    points = [(0.0, 0.0, 0.0), (0.0, 0.0, half), (0.0, 0.0, 2.0 * half), limb]
+    return tree([-1, 0, 0], points, [0.1, 0.1, thin], [True, True, False])
 
 
 def random_tree(seed: int, limbs: int) -> Skeleton:

@@ -167,9 +167,9 @@ def _corners(turn: _Floats, share: _Floats) -> _Floats:
     """
     known = np.argmax(~np.isnan(turn), axis=1)
     turn = turn - np.round(turn - turn[np.arange(len(turn)), known][:, None])
-    unknown = np.all(np.isnan(turn), axis=1, keepdims=True)
-    between = np.nanmean(np.where(unknown, 0.0, turn), axis=1)
-    turn = np.where(np.isnan(turn), between[:, None], turn)
+    none = np.isnan(turn)
+    between = np.where(none, 0.0, turn).sum(axis=1) / np.maximum((~none).sum(axis=1), 1)
+    turn = np.where(none, between[:, None], turn)
     return np.stack((turn, share), axis=-1)
 
 

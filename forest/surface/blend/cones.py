@@ -160,8 +160,8 @@ def check(skeleton: Skeleton) -> None:
 
 
 def thick_enough(skeleton: Skeleton, thinnest_m: float) -> NDArray[np.bool_]:
-    """Mark the internodes that are, or bear, one of at least this radius."""
-    keep = skeleton.radius >= thinnest_m
+    """Mark the internodes that are, or bear, one of at least this radius that has a length."""
+    keep = (skeleton.radius >= thinnest_m) & (skeleton.length > SHORTEST)
     for i in range(len(skeleton) - 1, 0, -1):
         if keep[i] and skeleton.parent[i] >= 0:
             keep[skeleton.parent[i]] = True
@@ -221,9 +221,10 @@ def limbs_of(
     """
     check(skeleton)
     kept = thick_enough(skeleton, thinnest_m)
-    if not kept.any():
+    long = skeleton.length > SHORTEST
+    if not kept.any() and long.any():
         raise InputError(
-            f"the thickest internode has a radius of {skeleton.radius.max():.3g} m",
+            f"the thickest internode has a radius of {skeleton.radius[long].max():.3g} m",
             where="cell_m",
             expected=f"cells at most a part of that radius, here thinnest {thinnest_m:.3g} m",
         )

@@ -27,11 +27,11 @@ READINGS = ("corrected", "paper")
 THINNEST = 2.0
 #: Usual cells are this part of the radius at the ground, but within these bounds, m.
 _USUAL_PART, _USUAL_LEAST, _USUAL_MOST = 0.1, 0.001, 0.02
-_TRIES = 3
+_TRIES = 5
 
 
 class CrossingWarning(UserWarning):
-    """Limbs cross: the mesh is closed, but has handles."""
+    """Limbs cross or touch: the mesh is closed, but has handles."""
 
 
 def usual_cell(skeleton: Skeleton) -> float:
@@ -120,7 +120,8 @@ def blended(
     cells_in_radius : float
         How many cells, at least, the radius of a thick limb is.
     strict : bool
-        Whether to refuse limbs that cross away from a joint; else they are warned of.
+        Whether to refuse limbs that cross away from a joint, or pass so near to each other that
+        their surfaces merge; else they are warned of.
 
     Returns
     -------
@@ -132,7 +133,8 @@ def blended(
     ------
     InputError
         If the skeleton has no surface, the cells are too large for the tree or too small for the
-        memory (said before anything is made), or limbs cross and `strict` is set.
+        memory (said before anything is made), limbs cross or touch and `strict` is set, or the
+        surface is not closed with cells of this width.
 
     Notes
     -----
@@ -152,54 +154,92 @@ def blended(
         readings=readings,
     )
     check_memory(blend.limbs.cones, cell_m, cells_in_radius)
-    _tell_crossings(blend, strict)
-    points, triangles = _closed(blend, cell_m, cells_in_radius)
+    crossed = _tell_crossings(blend, strict)
+    points, triangles, handles = _closed(blend, cell_m, cells_in_radius)
+    if handles and not crossed:
+        _tell_handles(handles, cell_m, strict)
     _, side = carry_frames(skeleton)
     twigs = twigs_of(skeleton, blend, side, cell_m)
-    return _dressed(skeleton, blend, weld(points, triangles, twigs), twigs, side)
+    mesh = _dressed(skeleton, blend, weld(points, triangles, twigs), twigs, side)
+    if not mesh.is_watertight:
+        raise _open(mesh, cell_m)
+    return mesh
 
 
-def _tell_crossings(blend: Blend, strict: bool) -> None:
+def _tell_crossings(blend: Blend, strict: bool) -> bool:
     pairs = crossings(blend)
     if not len(pairs):
-        return
+        return False
     first = ", ".join(f"{a} and {b}" for a, b in pairs[:3])
     text = f"{len(pairs)} pairs of axes cross away from their joints: {first}"
     if strict:
         raise InputError(text, where="skeleton", expected="axes that meet at joints alone")
     warnings.warn(text + "; the mesh has a handle at each", CrossingWarning, stacklevel=3)
+    return True
+
+
+def _tell_handles(handles: int, cell_m: float, strict: bool) -> None:
+    """Tell of handles that no pair of crossing axes explains."""
+    text = (
+        f"the mesh has {'a handle' if handles == 1 else f'{handles} handles'}, though no axes "
+        "cross: limbs pass within a cell of each other, or one comes back to itself"
+    )
+    if strict:
+        raise InputError(text, where="cell_m", expected=f"cells below {cell_m:g} m")
+    warnings.warn(f"{text}; cells below {cell_m:g} m may part them", CrossingWarning, stacklevel=3)
+
+
+def _open(mesh: Mesh, cell_m: float) -> InputError:
+    """Say where a mesh is open."""
+    edges = mesh.edges()[~mesh.edges_with_two_faces()]
+    if not len(edges):
+        return InputError("nothing of the tree stands above its ground", where="skeleton.start")
+    x, y, z = mesh.points[edges[0]].mean(axis=0)
+    count = "an edge" if len(edges) == 1 else f"{len(edges)} edges, the first"
+    return InputError(
+        f"the surface stays open at {count} near {x:.3f}, {y:.3f}, {z:.3f} m",
+        where="cell_m",
+        expected=f"another width than {cell_m:g} m, as {0.7 * cell_m:.2g} m",
+    )
 
 
 def _closed(
     blend: Blend, cell_m: float, cells_in_radius: float
-) -> tuple[_Floats, NDArray[np.int32]]:
-    """Polygonise; where cells were left out that the surface passes, look for more of them."""
+) -> tuple[_Floats, NDArray[np.int32], int]:
+    """Polygonise; where cells were left out that the surface passes, look for more of them.
+
+    Gives points, triangles, and how many handles they have.
+    """
     lattice = lattice_of(blend.limbs.cones, cell_m, cells_in_radius)
     slope = SLOPE
     for _ in range(_TRIES):
         leaves = cells_near(blend, lattice, cells_in_radius, slope)
         points, triangles = march(blend, lattice, leaves)
-        if Mesh(points, triangles, np.zeros((0, 3, 2))).is_watertight:
-            break
+        mesh = Mesh(points, triangles, np.zeros((0, 3, 2)))
+        if mesh.is_watertight:
+            return _wood_alone(blend, mesh)
         slope *= 1.6
-    return _wood_alone(blend, points, triangles)
+    raise _open(mesh, cell_m)
 
 
-def _wood_alone(
-    blend: Blend, points: _Floats, triangles: NDArray[np.int32]
-) -> tuple[_Floats, NDArray[np.int32]]:
+def _wood_alone(blend: Blend, mesh: Mesh) -> tuple[_Floats, NDArray[np.int32], int]:
     """Drop hollows enclosed in the wood, and crumbs: one part stays per stem from the ground."""
-    part = Mesh(points, triangles, np.zeros((0, 3, 2))).components()
-    stems = int(np.sum(np.isfinite(blend.limbs.cones.ground)))
-    if part.max(initial=0) + 1 <= 1:
-        return points, triangles
-    a, b, c = (points[triangles[:, k]] - points.mean(axis=0) for k in range(3))
-    volume = np.bincount(part, np.sum(a * np.cross(b, c), axis=1))
-    stay = np.argsort(-volume, kind="stable")[: max(stems, 1)]
-    triangles = triangles[np.isin(part, stay[volume[stay] > 0.0])]
-    needed = np.zeros(len(points), np.bool_)
-    needed[triangles.ravel()] = True
-    return points[needed], (np.cumsum(needed) - 1)[triangles].astype(np.int32)
+    points, triangles, part = mesh.points, mesh.triangles, mesh.components()
+    parts = int(part.max()) + 1
+    if parts > 1:
+        stems = int(np.sum(np.isfinite(blend.limbs.cones.ground)))
+        a, b, c = (points[triangles[:, k]] - points.mean(axis=0) for k in range(3))
+        volume = np.bincount(part, np.sum(a * np.cross(b, c), axis=1))
+        stay = np.argsort(-volume, kind="stable")[: max(stems, 1)]
+        stay = stay[volume[stay] > 0.0]
+        triangles = triangles[np.isin(part, stay)]
+        needed = np.zeros(len(points), np.bool_)
+        needed[triangles.ravel()] = True
+        points = points[needed]
+        triangles = (np.cumsum(needed) - 1)[triangles].astype(np.int32)
+        parts = len(stay)
+    # Euler's formula of a closed mesh, which has three edges for two triangles.
+    return points, triangles, parts - (len(points) - len(triangles) // 2) // 2
 
 
 def _dressed(skeleton: Skeleton, blend: Blend, welded: Welded, twigs: Twigs, side: _Floats) -> Mesh:
