@@ -139,8 +139,10 @@ def _with_meshes(run: Run, observer: Observer) -> Run:
         from forest.view.tree_mesh import write_samples
 
         observer.say(f"writing the surfaces of {len(run.samples)} sample trees")
-        folder = write_samples(run, f".{form}", bark=wanted.bark)[0].parent
-        observer.say(f"{folder} holds them")
+        written = write_samples(
+            run, f".{form}", bark=wanted.bark, surface=wanted.surface, say=observer.say
+        )
+        observer.say(f"{written[0].parent} holds them")
     return run
 
 
@@ -245,7 +247,7 @@ def _so_far(scenario: Scenario, years_done: int) -> dict[str, Any]:
         climate["series"] = [y for y in climate["series"] if y["year"] < done.stop]
     del content["years"], content["planned_years"]
     samples = content["output"]["sample_trees"]
-    del samples["meshes"], samples["bark"]
+    del samples["meshes"], samples["surface"], samples["bark"]
     if samples["at_year"] == scenario.calendar[-1] or samples["at_year"] not in done:
         samples["at_year"] = None
     return content

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from forest.cli.shared import RunFile, check_targets
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from forest.species import Species
     from forest.surface.export import Part
     from forest.surface.mesh import Mesh
     from forest.trees.skeleton import Skeleton
@@ -41,6 +43,27 @@ def mesh(
     tolerance: Annotated[
         float, typer.Option(metavar="M", help="How far tubes may be off round.")
     ] = 0.001,
+    reaction: Annotated[
+        bool | None,
+        typer.Option(
+            "--reaction/--no-reaction",
+            help="Blended limbs swell by reaction wood, as their weight asks; default: no.",
+        ),
+    ] = None,
+    flare: Annotated[
+        bool | None,
+        typer.Option(
+            "--flare/--no-flare",
+            help="Root flare of a blended stem; default: from 5 cm of radius at the ground on.",
+        ),
+    ] = None,
+    readings: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WORD",
+            help="How limbs blend: corrected, or paper (as printed); default: corrected.",
+        ),
+    ] = None,
     leaves: Annotated[
         bool | None,
         typer.Option("--leaves/--no-leaves", help="Leaf cards; default: with all but .ply."),
@@ -63,26 +86,38 @@ def mesh(
 
         forest mesh run.h5 --tree 12 --to fast.glb --kind tubes
 
+        forest mesh run.h5 --tree 12 --to limbs.glb --reaction --no-flare
+
         forest mesh run.h5 --tree 12 --to orders.png --colour order
     """
     from forest.errors import InputError, nearest
     from forest.record.run import open_run
+    from forest.surface.tubes import tubes
     from forest.trees.leaves import leaves_of
-    from forest.view.tree_mesh import species_of, tree_parts, with_leaves
+    from forest.view.tree_mesh import species_of, too_thin, tree_parts, with_leaves
 
     check_targets((to, (*MESH, ".png")), force=force)
     if kind not in _KINDS:
         raise InputError(f"unknown kind '{kind}', {nearest(kind, _KINDS)}")
+    blend = _Blend(cell, reaction, flare, readings)
+    blend.check(kind)
     with open_run(run_file) as run:
         check_sample(run, tree)
         at = int(run.sample_years(tree)[-1]) if year is None else year
         skeleton = run.skeleton(tree, at)
         species = species_of(run, skeleton)
     with working(f"the surface of {len(skeleton):,} internodes"):
-        wood = _surface(skeleton, kind, cell, tolerance)
+        thin = kind == "blended" and cell is None and too_thin(skeleton)
+        wood = (
+            tubes(skeleton, tolerance_m=tolerance)
+            if thin or kind == "tubes"
+            else blend.surface(skeleton, species)
+        )
         cards = leaves_of(skeleton, species) if with_leaves(to, leaves) else None
         parts = tree_parts(wood, skeleton, cards)
     write_parts(parts, to, colour, force)
+    if thin:
+        typer.echo(f"tree {tree} is too thin to blend without --cell: tubes", err=True)
     triangles = sum(len(part.mesh.triangles) for part in parts)
     typer.echo(f"{to}: {triangles:,} triangles, tree {tree} in {at}, {wood.volume:.4g} m3 of wood")
 
@@ -113,14 +148,40 @@ def working(what: str) -> Iterator[None]:
             yield
 
 
-def _surface(skeleton: Skeleton, kind: str, cell: float | None, tolerance: float) -> Mesh:
-    if kind == "tubes":
-        from forest.surface.tubes import tubes
+@dataclass(frozen=True)
+class _Blend:
+    """What was said of a blended surface; None: nothing."""
 
-        return tubes(skeleton, tolerance_m=tolerance)
-    from forest.surface.blend import blended
+    cell: float | None
+    reaction: bool | None
+    flare: bool | None
+    readings: str | None
 
-    return blended(skeleton, cell_m=cell)
+    def check(self, kind: str) -> None:
+        """Refuse unknown readings, and what tubes know nothing of."""
+        from forest.errors import InputError, nearest
+        from forest.surface.blend.whole import READINGS
+
+        said = [name for name, value in vars(self).items() if value is not None]
+        if said and kind == "tubes":
+            raise InputError(
+                f"tubes have no {said[0]}", where=f"--{said[0]}", expected="--kind blended with it"
+            )
+        if self.readings not in (None, *READINGS):
+            hint = nearest(str(self.readings), READINGS)
+            raise InputError(f"unknown readings '{self.readings}', {hint}")
+
+    def surface(self, skeleton: Skeleton, species: Species) -> Mesh:
+        """Blend a tree."""
+        from forest.surface.blend import blended, reaction_wood
+
+        return blended(
+            skeleton,
+            cell_m=self.cell,
+            reaction=reaction_wood(skeleton, species) if self.reaction else None,
+            flare=None if self.flare is False else "usual",
+            readings=self.readings or "corrected",
+        )
 
 
 def check_sample(run: Any, tree: int) -> None:

@@ -375,6 +375,12 @@ class SampleTrees(Table):
         "last year, into the folder RUN_meshes beside the run file",
         unit="",
     )
+    surface: Literal["tubes", "blended"] = quantity(
+        "tubes",
+        "what these are: tubes, one for each axis, or blended, one whole, flared at the foot "
+        "(slow; a tree that cannot be blended has tubes); needs `meshes`",
+        unit="",
+    )
     bark: bool = quantity(
         False,
         "whether these surfaces have bark that tears as the tree grew; needs `meshes`",
@@ -382,9 +388,12 @@ class SampleTrees(Table):
     )
 
     @model_validator(mode="after")
-    def _bark_has_meshes(self) -> SampleTrees:
-        if self.bark and self.meshes is None:
-            raise Refusal("true", key="bark", expected='meshes = "glb" beside it')
+    def _has_meshes(self) -> SampleTrees:
+        if self.meshes is None:
+            if self.bark:
+                raise Refusal("true", key="bark", expected='meshes = "glb" beside it')
+            if self.surface != "tubes":
+                raise Refusal(self.surface, key="surface", expected='meshes = "glb" beside it')
         return self
 
 

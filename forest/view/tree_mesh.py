@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+from forest.errors import InputError
 from forest.record.run import Run
 from forest.record.wood import yearly_wood
 from forest.species import Species
@@ -12,6 +14,7 @@ from forest.surface.bark.bark_mesh import dressed_parts
 from forest.surface.bark.presets import Preset
 from forest.surface.bark.tree_bark import bark_tree
 from forest.surface.bark.usual import usual_preset
+from forest.surface.blend.whole import THINNEST, blended, usual_cell
 from forest.surface.export import Material, Part, leaf_parts, linear, write_mesh
 from forest.surface.mesh import Mesh
 from forest.surface.tubes import tubes
@@ -51,8 +54,20 @@ def tree_parts(wood: Mesh, skeleton: Skeleton, leaves: Leaves | None) -> list[Pa
     return parts
 
 
-def write_samples(run: Run, suffix: str, *, bark: bool = False) -> list[Path]:
-    """Write tubes of all sample trees of a run, each as it was in its last year on record.
+def too_thin(skeleton: Skeleton) -> bool:
+    """Tell whether usual cells are too large to blend a tree: a seedling of a few mm."""
+    return float(skeleton.radius.max()) < THINNEST * usual_cell(skeleton)
+
+
+def write_samples(
+    run: Run,
+    suffix: str,
+    *,
+    bark: bool = False,
+    surface: str = "tubes",
+    say: Callable[[str], None] = lambda line: None,
+) -> list[Path]:
+    """Write the surfaces of all sample trees of a run, each in its last year on record.
 
     Parameters
     ----------
@@ -62,6 +77,10 @@ def write_samples(run: Run, suffix: str, *, bark: bool = False) -> list[Path]:
         Format, one of `forest.surface.export.SUFFIXES`.
     bark : bool
         Whether trees that are thick enough have bark with maps (`barked_parts`).
+    surface : "tubes" or "blended"
+        What wood is; trees that cannot be blended (too thin, too large for the memory) have tubes.
+    say : callable
+        Is told of each such tree in a line.
 
     Returns
     -------
@@ -77,12 +96,21 @@ def write_samples(run: Run, suffix: str, *, bark: bool = False) -> list[Path]:
         skeleton = run.skeleton(tree_id, year)
         to = folder / f"tree_{tree_id}_{year}{suffix}"
         leaves = leaves_of(skeleton, species_of(run, skeleton)) if with_leaves(to) else None
-        wood = tubes(skeleton)
+        wood = _blended_or_tubes(skeleton, say) if surface == "blended" else tubes(skeleton)
         parts = tree_parts(wood, skeleton, leaves)
         if bark and skeleton.radius.max() >= LEAST_RADIUS_M:
             parts[:1] = barked_parts(run, skeleton, year, wood)
         written.append(write_mesh(parts, to, overwrite=True))
     return written
+
+
+def _blended_or_tubes(skeleton: Skeleton, say: Callable[[str], None]) -> Mesh:
+    """Blend a tree if it can be; one that cannot must not keep the others from their files."""
+    try:
+        return blended(skeleton)
+    except InputError as refused:
+        say(f"tree {skeleton.tree_id} is written as tubes: {refused}")
+        return tubes(skeleton)
 
 
 def barked_parts(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ from PIL import Image
 from forest import simulate
 from forest.errors import InputError
 from forest.record.run import open_run
+from forest.surface.bark.axes import LEAST_RADIUS_M
 from forest.surface.tubes import tubes
+from forest.view import tree_mesh
 from forest.view.tree_mesh import barked_parts
 from tests.tiny import forest, tiny
 
@@ -138,14 +141,29 @@ def test_an_unknown_tree_or_none(run_file: Path, tmp_path: Path) -> None:
         assert says in err
 
 
-def test_meshes_at_the_end_of_a_run_have_bark(tmp_path: Path) -> None:
-    """Trees thick enough do; a short run's trees are not, and have plain wood."""
-    to = tmp_path / "run.h5"
+def test_meshes_at_the_end_of_a_run_have_bark(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Trees thick enough do; others have plain wood."""
+    small = partial(tree_mesh.dressed_parts, size=256)  # pixels: large maps take long
+    monkeypatch.setattr(tree_mesh, "dressed_parts", small)
     samples = "output.sample_trees"
-    simulate(tiny(f"{samples}.meshes=obj", f"{samples}.bark=true", "years=3"), to).close()
-    assert list((tmp_path / "run_meshes").glob("*.obj"))
-    with pytest.raises(InputError, match="meshes"):
-        tiny(f"{samples}.bark=true")
+    simulate(tiny(f"{samples}.meshes=obj", f"{samples}.bark=true"), tmp_path / "run.h5").close()
+    barked = {
+        int(to.name.split("_")[1]): "usemtl bark_0" in to.read_text()
+        for to in (tmp_path / "run_meshes").glob("*.obj")
+    }
+    with open_run(tmp_path / "run.h5") as run:
+        last = {tree: int(run.sample_years(tree)[-1]) for tree in run.samples}
+        stout = {t: run.skeleton(t, y).radius.max() >= LEAST_RADIUS_M for t, y in last.items()}
+    assert barked == stout
+    assert set(stout.values()) == {True, False}
+
+
+def test_bark_or_a_blend_at_the_end_of_a_run_needs_meshes() -> None:
+    for key in ("bark=true", "surface=blended"):
+        with pytest.raises(InputError, match="meshes"):
+            tiny(f"output.sample_trees.{key}")
 
 
 def test_bark_for_a_mesh(run_file: Path) -> None:

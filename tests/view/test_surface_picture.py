@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +12,15 @@ import trimesh
 from PIL import Image
 
 from forest.errors import InputError
+from forest.record.run import Run, open_run
 from forest.simulation import simulate
+from forest.surface.blend import blended, reaction_wood
 from forest.surface.export import Material, Part, leaf_parts
+from forest.surface.mesh import Mesh
 from forest.surface.tubes import tubes
 from forest.trees.leaves import leaves_of
+from forest.trees.skeleton import Skeleton
+from forest.view import tree_mesh
 from forest.view.surface_picture import draw_mesh
 from forest.view.tree_mesh import species_of
 from tests.surface.bushes import bush
@@ -32,8 +39,6 @@ def _pixels(to: Path) -> np.ndarray:
 
 
 def test_meshes_of_sample_trees_are_written_at_the_end(run_file: Path) -> None:
-    from forest import open_run
-
     with open_run(run_file) as run:
         years = {tree_id: int(run.sample_years(tree_id)[-1]) for tree_id in run.samples}
     folder = run_file.with_name("tiny_meshes")
@@ -48,6 +53,30 @@ def test_a_resumed_run_may_ask_for_other_meshes(tmp_path: Path) -> None:
     assert not (tmp_path / "run_meshes").exists()
     simulate(tiny("years=4", "output.sample_trees.meshes=vtp"), to, resume=True).close()
     assert all(p.suffix == ".vtp" for p in (tmp_path / "run_meshes").iterdir())
+
+
+def test_meshes_at_the_end_may_be_blended(
+    run_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tree that cannot be is written as tubes, and the others are written all the same."""
+    whole = tree_mesh.blended
+    refused = 4
+
+    def blend(skeleton: Skeleton) -> Mesh:
+        if skeleton.tree_id == refused:
+            raise InputError("no memory")
+        return whole(skeleton, cell_m=0.005)
+
+    monkeypatch.setattr(tree_mesh, "blended", blend)
+    said: list[str] = []
+    with open_run(run_file) as run:
+        run.path = tmp_path / "run.h5"
+        files = tree_mesh.write_samples(run, ".ply", surface="blended", say=said.append)
+        assert len(files) == len(run.samples)
+    assert said == ["tree 4 is written as tubes: no memory"]
+    for to in files:
+        pieces = trimesh.load(to).body_count
+        assert (pieces > 1) == (f"tree_{refused}_" in to.name)
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".obj", ".ply", ".vtp", ".png"])
@@ -66,11 +95,65 @@ def test_the_command_writes_a_sample_tree(run_file: Path, tmp_path: Path, suffix
         assert len(trimesh.load(green, process=False).faces) > len(bare.faces)
 
 
+def test_a_seedling_is_written_as_tubes(
+    run_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grown = Run.skeleton
+
+    def seedling(run: Run, tree_id: int, year: int) -> Skeleton:
+        tree = grown(run, tree_id, year)
+        return replace(tree, radius=np.float32(0.0019) / tree.radius.max() * tree.radius)
+
+    monkeypatch.setattr(Run, "skeleton", seedling)
+    blended, plain = tmp_path / "a.ply", tmp_path / "b.ply"
+    words = ("mesh", run_file, "--tree", "4", "--year", "2001", "--to")
+    code, _, err = forest(*words, blended)
+    assert (code, err) == (0, "tree 4 is too thin to blend without --cell: tubes\n")
+    assert forest(*words, plain, "--kind", "tubes")[::2] == (0, "")
+    assert blended.read_bytes() == plain.read_bytes()
+    code, _, err = forest(*words, blended, "--force", "--cell", "0.01")
+    assert code == 2
+    assert "the thickest internode has a radius" in err
+
+
+def test_the_command_blends_as_it_is_told(
+    run_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each option reaches the mesh: it is the one that Python makes with the same words."""
+    grown = Run.skeleton
+
+    def large(run: Run, tree_id: int, year: int) -> Skeleton:  # enough for a root flare
+        tree = grown(run, tree_id, year)
+        return replace(tree, start=4 * tree.start, end=4 * tree.end, radius=4 * tree.radius)
+
+    monkeypatch.setattr(Run, "skeleton", large)
+    with open_run(run_file) as run:
+        tree = run.skeleton(1, 2004)
+        wood = reaction_wood(tree, species_of(run, tree))
+    said: list[tuple[tuple[str, ...], dict[str, Any]]] = [
+        ((), {}),
+        (("--reaction",), {"reaction": wood}),
+        (("--no-flare",), {"flare": None}),
+        (("--readings", "paper"), {"readings": "paper"}),
+    ]
+    to, volumes = tmp_path / "tree.ply", set()
+    for words, same in said:
+        given = ("--year", "2004", "--cell", "0.012", "--to", to, "--force", *words)
+        assert forest("mesh", run_file, "--tree", "1", *given)[0] == 0
+        volume = trimesh.load(to).volume
+        assert volume == pytest.approx(blended(tree, cell_m=0.012, **same).volume, rel=1e-6)
+        volumes.add(round(volume, 8))
+    assert len(volumes) == len(said), volumes
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("--tree", "9999", "--to", "x.glb"), "tree 9999 is no sample tree; expected one of its"),
         (("--tree", "1", "--to", "x.glb", "--kind", "tube"), "did you mean 'tubes'?"),
+        (("--tree", "1", "--to", "x.glb", "--readings", "papr"), "did you mean 'paper'?"),
+        (("--tree", "1", "--to", "x.glb", "--kind", "tubes", "--reaction"), "--reaction: tubes"),
+        (("--tree", "1", "--to", "x.glb", "--kind", "tubes", "--cell", "1"), "--cell: tubes"),
         (("--tree", "1", "--to", "x.stl"), "unknown format '.stl'"),
         (("--tree", "1", "--to", "x.glb", "--year", "1900"), "not on record in 1900"),
         (("--tree", "1", "--to", "x.png", "--colour", "radius"), "did you mean 'radius_m'?"),
@@ -91,8 +174,6 @@ def test_the_command_refuses(
 
 
 def test_a_tree_without_cards_is_left_by_colouring(run_file: Path, tmp_path: Path) -> None:
-    from forest import open_run
-
     with open_run(run_file) as run:
         skeleton = run.skeleton(1, 2008)
         leaves = leaves_of(skeleton, species_of(run, skeleton))

@@ -270,21 +270,30 @@ def gradient(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
 
 @njit
 def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: Any) -> Any:
-    """Move a point onto the surface by Newton steps of at most `most` metres each."""
+    """Move a point onto the surface by Newton steps of at most `most` metres each.
+
+    The slope is taken anew only where the last step brought less than three quarters of the way.
+    """
     f, which = value(field, x, y, z, hint)
+    gx = gy = gz = 0.0
+    square = 1.0
+    fresh = True
     for _ in range(steps):
         if abs(f) < _CLOSE:
             break
-        gx = (value(field, x + _STEP, y, z, which)[0] - f) / _STEP
-        gy = (value(field, x, y + _STEP, z, which)[0] - f) / _STEP
-        gz = (value(field, x, y, z + _STEP, which)[0] - f) / _STEP
-        square = max(gx * gx + gy * gy + gz * gz, 0.01)
+        if fresh:
+            gx = (value(field, x + _STEP, y, z, which)[0] - f) / _STEP
+            gy = (value(field, x, y + _STEP, z, which)[0] - f) / _STEP
+            gz = (value(field, x, y, z + _STEP, which)[0] - f) / _STEP
+            square = max(gx * gx + gy * gy + gz * gz, 0.01)
         step = f / square
         size = abs(step) * np.sqrt(gx * gx + gy * gy + gz * gz)
         if size > most:
             step *= most / size
         x, y, z = x - step * gx, y - step * gy, z - step * gz
+        before = abs(f)
         f, which = value(field, x, y, z, which)
+        fresh = abs(f) > 0.25 * before
     return x, y, z, which
 
 

@@ -281,11 +281,11 @@ def _even(
     most: NDArray[np.float64],
     hints: _Keys,
 ) -> NDArray[np.float64]:
-    """Pull vertices onto the surface and even out the triangles."""
+    """Even out the triangles near the surface, then pull their vertices onto it."""
     kernel = blend.kernel
-    in_threads(_settle, kernel, points, most, np.int64(2), hints)
+    in_threads(_settle, kernel, points, most, np.int64(1), hints)
     count = np.bincount(triangles.ravel(), minlength=len(points))[:, None].astype(np.float64)
-    for left in range(_ROUNDS - 1, -1, -1):
+    for _ in range(_ROUNDS):
         middle = np.zeros_like(points)
         for k in range(3):
             for axis in range(3):
@@ -296,5 +296,5 @@ def _even(
         size = np.linalg.norm(step, axis=1)
         step *= np.minimum(1.0, 0.5 * most / np.maximum(size, 1e-12))[:, None]
         points = points + step
-        in_threads(_settle, kernel, points, most, np.int64(1 if left else 5), hints)
+    in_threads(_settle, kernel, points, most, np.int64(6), hints)
     return points
