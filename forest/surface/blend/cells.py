@@ -35,6 +35,7 @@ _BITS = 21
 _MASK = (1 << _BITS) - 1
 _LARGEST_LEVEL = 6
 _PERCENT = 0.9  # of the free memory that may be used
+_MOST_CELLS = 40e6  # some ten minutes
 
 
 def pack(grid: NDArray[np.int64]) -> _Keys:
@@ -117,8 +118,15 @@ def free_memory() -> float:
 
 
 def check_memory(cones: Cones, cell_m: float, in_radius: float = CELLS_IN_RADIUS) -> None:
-    """Refuse cells so small that their surface would not fit into the free memory."""
+    """Refuse cells so small that the surface would take hours, or more than the free memory."""
     need, free = bytes_needed(cones, cell_m, in_radius), _PERCENT * free_memory()
+    cells = need / BYTES_PER_CELL
+    if cells > _MOST_CELLS:
+        raise InputError(
+            f"the surface would take {cells / 1e6:.0f} million cells of {cell_m:g} m",
+            where="cell_m",
+            expected=f"cells of about {cell_m * np.sqrt(cells / _MOST_CELLS):.2g} m or more",
+        )
     if need > free:
         enough = cell_m * np.sqrt(need / free)
         raise InputError(
