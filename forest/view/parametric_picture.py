@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from forest.parametric import Parameters, ParametricTree
 from forest.parametric.ratios import lobed
 from forest.record.export import whole_file
-from forest.surface.export import Material, Part, leaf_parts
+from forest.surface.export import Material, Part, leaf_parts, linear
 from forest.surface.tubes import tubes
 from forest.trees.leaves import Leaves
 from forest.view import shapes
 from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, pixels
 from forest.view.shading import LightVolume
-from forest.view.tree_mesh import linear
 
 #: The seasons, and how young the leaves are in each, 0 to 1.
 SEASONS = {"spring": 0.5, "summer": 0.0, "fall": 0.0, "winter": 0.0}

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
 
 from forest.errors import InputError
 from forest.record.run import Run
@@ -17,7 +15,7 @@ from forest.surface.bark.presets import Preset
 from forest.surface.bark.tree_bark import bark_tree
 from forest.surface.bark.usual import usual_preset
 from forest.surface.blend.whole import THINNEST, blended, usual_cell
-from forest.surface.export import Material, Part, leaf_parts, write_mesh
+from forest.surface.export import Material, Part, leaf_parts, linear, write_mesh
 from forest.surface.mesh import Mesh
 from forest.surface.tubes import tubes
 from forest.trees.leaves import Leaves, leaves_of
@@ -30,13 +28,6 @@ _WITHOUT_LEAVES = (".ply",)  # for measuring closed wood
 def with_leaves(to: Path, wanted: bool | None = None) -> bool:
     """Tell whether a file shows leaves: as wanted, else all formats but .ply."""
     return to.suffix.lower() not in _WITHOUT_LEAVES if wanted is None else wanted
-
-
-def linear(colour: Sequence[float]) -> tuple[float, float, float]:
-    """Give an sRGB colour, 0 to 1, as the linear one that materials have."""
-    c = np.asarray(colour, np.float64)
-    red, green, blue = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).tolist()
-    return red, green, blue
 
 
 def species_of(run: Run, skeleton: Skeleton) -> Species:

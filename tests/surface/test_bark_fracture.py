@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from forest._threads import using_threads
 from forest.errors import InputError
 from forest.surface.bark import FRACTURE, Material, fracture_range, grow_bark, shrinking
+from forest.surface.bark.material import Physics
+from forest.surface.bark.rings import copied, solve_strip
 from tests.reference import bark as twin
 from tests.surface.bark_cases import check, column, grown, materials, statistics, strip_of, torn
 
@@ -300,3 +302,56 @@ def test_bad_fields() -> None:
 def test_bad_materials(name: str, value: object) -> None:
     with pytest.raises(InputError, match=f"bark material: {name} = "):
         Material(**{name: value})  # type: ignore[arg-type]
+
+
+def test_strips_without_width_are_refused() -> None:
+    for width in (0.0, -0.01, np.nan):
+        with pytest.raises(InputError, match="strips of"):
+            column(3, width)
+        geometry = column(3)._replace(width=np.array([0.02, width, 0.02]))
+        with pytest.raises(InputError, match="strip 1 has no width"):
+            grow_bark(geometry, np.ones((2, 3)))
+    around = column(3)._replace(width_around=np.array([[1.0], [1.0], [0.0]]))
+    with pytest.raises(InputError, match="strip 2 has no width"):
+        grow_bark(around, np.ones((2, 3)))
+
+
+@pytest.mark.parametrize("attachment", [0.0, 50.0])
+def test_all_strips_lie_at_equilibrium_after_a_trigger(attachment: float) -> None:
+    """Only the strips that tear are solved anew; the springs of the others stay as they were."""
+    bark = grown(12, 0.4, 0.6, 4, attachment=attachment, run_m=0.04)
+    (strip,) = np.flatnonzero(torn(bark) == torn(bark).max())[:1]
+    widest = bark.elements.of(strip)
+    row = int(np.argmax(np.where(widest.kind == FRACTURE, 0.0, widest.width)))
+    after = bark.trigger(int(strip), float(widest.start[row] + 0.5 * widest.width[row]))
+    touched = torn(after) > torn(bark)
+    assert touched.any() and not touched.all()
+    solved = copied(after._rings)
+    physics = Physics.of(after.material)
+    for s in range(12):
+        solve_strip(solved, physics, np.int64(s))
+    assert solved.left == pytest.approx(after._rings.left, abs=1e-9)
+    assert solved.open == pytest.approx(after._rings.open, abs=1e-9)
+    untouched = ~touched[strip_of(bark)]
+    assert np.array_equal(
+        after.elements.rest[~touched[strip_of(after)]], bark.elements.rest[untouched]
+    )
+
+
+def test_plates_tear_where_the_girth_grows() -> None:
+    """A next generation stretches by sectors too, from where they lie on the surface that tore."""
+    spread = np.where(np.arange(8) < 4, 3.0, 1.0) * np.ones((12, 1))
+    girth = np.full(12, 1.2)
+    old = grow_bark(column(12), shrinking(girth * 0.8, 0.6), Material(), dilatation=spread)
+    wider = shrinking(girth, 0.8)[1:]
+    new = old.refracture(wider, dilatation=spread, substeps=2)
+    check(new)
+    assert np.array_equal(new._rings.edges[:, -1], girth)
+    begin, end = (b._rings.edges[:, 4] / b.strips.girth for b in (old, new))
+    assert (begin > 0.5).all() and (end > begin).all()
+    even = old.refracture(wider)
+    assert even._rings.edges[:, 4] / girth == pytest.approx(begin)
+    with pytest.raises(InputError, match="a table of"):
+        old.refracture(wider, dilatation=spread[:, :6])
+    with pytest.raises(InputError, match="a table of"):
+        even.grow(1.1 * girth[None], dilatation=spread[:, :2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -256,6 +257,54 @@ def test_a_cone_and_an_ellipse() -> None:
     assert history.dilatation[0, 5].max() > 2.0 * spread.min()
 
 
+def bulged(factor: float) -> np.ndarray:
+    """Widen one side of a round stem."""
+    return 0.1 * (1.0 + factor * np.maximum(np.cos(EVEN), 0.0)) * np.ones((50, 1))
+
+
+def test_two_shapes_become_bark() -> None:
+    """Shapes linked by radial projection tear where the second one bulges."""
+    stem = pole(0.1, 1.0, 10)
+    tree = lay_strips(stem, STRIP)
+    history = linked_girths(tree, [bulged(0.0), 1.05 * bulged(0.0), 1.2 * bulged(1.0)])
+    grown = bark_tree(stem, Preset.load("oak"), 1, history=history, law="conserved", strip_m=STRIP)
+    assert grown.time == 2.0
+    assert widths_of(grown) == pytest.approx(perimeter(1.2 * bulged(1.0)))
+    e = grown.bark.elements
+    strip = np.repeat(np.arange(50), np.diff(e.offsets))
+    rows = e.kind == FRACTURE
+    turn = (e.start + 0.5 * e.width)[rows] / grown.bark.strips.girth[strip[rows]]
+    opened = e.width[rows] * (np.cos(2.0 * np.pi * turn) > 0.0)
+    assert opened.sum() > 0.6 * e.width[rows].sum()
+    assert grown.at(1.0).bark.elements.width.sum() < e.width.sum()
+    assert grown.maps(64)[0].width_m == pytest.approx(history.girth[-1].mean())
+    meshes = linked_girths(tree, [cone(0.1, 0.1), cone(0.2, 0.18)])
+    by_preset = bark_tree(stem, Preset.load("oak"), 1, history=meshes, strip_m=STRIP)
+    assert len(by_preset.bark.tears.strip) > 20
+    assert widths_of(by_preset) == pytest.approx(meshes.girth[-1])
+
+
+def test_a_history_that_does_not_fit_is_refused() -> None:
+    stem, oak_bark = pole(), Preset.load("oak")
+    tree = lay_strips(stem, STRIP)
+    history = linked_girths(tree, [bulged(0.0), bulged(0.5)])
+    with pytest.raises(InputError, match="beside wood"):
+        bark_tree(stem, oak_bark, history=history, wood=wood_of(stem), strip_m=STRIP)
+    with pytest.raises(InputError, match="girths of"):
+        bark_tree(stem, oak_bark, history=history, strip_m=0.1)
+    spread = history.dilatation
+    assert spread is not None
+    for wrong, message in (
+        (history._replace(times=np.array([1.0, 1.0])), "do not rise"),
+        (history._replace(dilatation=spread[:, :9]), "dilatation of"),
+        (history._replace(girth=history.girth * [[1.0], [np.nan]]), "no girth at the end"),
+    ):
+        with pytest.raises(InputError, match=message):
+            bark_tree(stem, oak_bark, history=wrong, strip_m=STRIP)
+    with pytest.raises(InputError, match="no outline"):
+        linked_girths(tree, [bulged(0.0), bulged(0.5)[:, :50]])
+
+
 def test_cracks_only_widen() -> None:
     """Time goes on without jumps: what is torn stays, at its place, and opens (shares of turns)."""
     grown = oak()
@@ -278,6 +327,22 @@ def test_cracks_only_widen() -> None:
     assert np.array_equal(last.elements.width, now.elements.width)
 
 
+def test_bark_of_an_earlier_time_is_to_look_at() -> None:
+    """Widths are drawn at that time's scale; the epidermis stays as long as it is, to the bit."""
+    moment = oak().at(2006)
+    bark, cut = moment.bark, moment.piece(0, 0.5, 1.0)
+    assert not hasattr(bark, "grow") and not hasattr(cut, "trigger")
+    assert bark.scale.max() < 1.0 and (oak().bark.scale == 1.0).all()
+    for view in (bark, cut):
+        e = view.elements
+        own = np.where(e.kind == FRACTURE, 0.0, e.rest)
+        assert np.array_equal(np.add.reduceat(own, e.offsets[:-1]), view.strips.rest)
+        assert np.add.reduceat(e.width, e.offsets[:-1]) == pytest.approx(view.strips.girth)
+    assert np.array_equal(bark.strips.rest, oak().bark.strips.rest)
+    began = cut.fractures.origin
+    assert (cut.tears.fracture[began[began >= 0]] == np.flatnonzero(began >= 0)).all()
+
+
 def test_same_bits_again() -> None:
     one, two = oak(), oak.__wrapped__()
     for a, b in zip(one.bark.elements, two.bark.elements, strict=True):
@@ -298,6 +363,27 @@ def test_plates_tear_again_over_the_years() -> None:
     ]
     assert share[0] <= share[1] <= share[2]
     grown.at(2010).maps(64, axes=(0,))
+
+
+def test_plates_tear_more_on_the_thick_side() -> None:
+    """Rings thick to one side open pine's second fractures there too."""
+    tree = forked(radius_m=0.2)
+    pine = Preset.load("pine")
+    share = []
+    for eccentricity in (0.0, 0.8):
+        wood = wood_of(tree, 16, eccentricity=eccentricity)
+        grown = bark_tree(tree, pine, 1, wood=wood, strip_m=STRIP)
+        e = grown.bark.elements
+        assert grown.bark.surface is not None
+        strip = np.repeat(np.arange(len(e.offsets) - 1), np.diff(e.offsets))
+        turn = (e.start + 0.5 * e.width) / grown.bark.strips.girth[strip]
+        side = grown.tree.paths[0].side[0]
+        east = np.arctan2(-side[1], side[0]) / (2.0 * np.pi)
+        rows = (e.kind == FRACTURE) & (grown.bark.strips.axis[strip] == 0)
+        near = np.cos(2.0 * np.pi * (turn - east)) > 0.0
+        share.append(e.width[rows & near].sum() / e.width[rows].sum())
+    assert share[0] == pytest.approx(0.5, abs=0.05)
+    assert share[1] > share[0] + 0.05
 
 
 @pytest.mark.parametrize("settings_", [{"shrink": True}, {"law": "conserved"}, {"years": 20}])
@@ -372,6 +458,14 @@ def test_refusals() -> None:
         bark_tree(pole(), preset, law="none")
     with pytest.raises(InputError, match="strips of no width"):
         lay_strips(pole(), 0.0)
+    with pytest.raises(InputError, match="no axis of a radius"):
+        lay_strips(pole(0.1, 1.0), 0.5)
+    for column in ("radius", "start", "end"):
+        values = getattr(pole(), column).copy()
+        values[3] = np.nan
+        stem = replace(pole(), **{column: values})
+        with pytest.raises(InputError, match=f"internode 3 of tree .* has a {column} that is no"):
+            bark_tree(stem, preset)
     with pytest.raises(InputError, match="no girth at 1990"):
         oak().at(1990)
     with pytest.raises(InputError, match="two or more"):

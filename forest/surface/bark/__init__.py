@@ -13,11 +13,13 @@ from forest.surface.bark.strips import (
     Strips,
     Tears,
 )
+from forest.surface.bark.viewed import BarkView
 
 __all__ = [
     "EPIDERMIS",
     "FRACTURE",
     "Bark",
+    "BarkView",
     "Crossings",
     "Elements",
     "Fractures",

@@ -23,6 +23,7 @@ SECTORS = 16
 #: Strips that memory and patience bear.
 MOST_STRIPS = 200_000
 _NARROWEST = 0.2  # of a strip's width, on the concave side of a sharp bend
+_FEWEST = 4  # strips of an axis
 _SHORTEST = 1e-6  # m; internodes that have no direction
 
 
@@ -185,28 +186,49 @@ def lay_strips(
     Raises
     ------
     InputError
-        No axis is so thick, or there would be more than `MOST_STRIPS`.
+        No axis is so thick over four strips, a radius or place is no number, or there would be
+        more than `MOST_STRIPS`.
     """
     if not strip_m > 0.0 or not least_radius_m > 0.0:
         raise InputError("strips of no width or radius", where="bark", expected="metres, above 0")
     if not len(skeleton):
         raise InputError(f"tree {skeleton.tree_id} has no internodes", expected="a tree with wood")
+    for name, column in (
+        ("radius", skeleton.radius),
+        ("start", skeleton.start),
+        ("end", skeleton.end),
+    ):
+        bad = np.flatnonzero(~np.isfinite(column).reshape(len(skeleton), -1).all(axis=1))
+        if len(bad):
+            raise InputError(
+                f"internode {bad[0]} of tree {skeleton.tree_id} has a {name} that is no number",
+                where="bark",
+                expected="metres",
+            )
     paths = _paths(skeleton, least_radius_m, strip_m)
     if not paths:
-        raise InputError(
-            f"tree {skeleton.tree_id} has no wood thicker than a radius of {least_radius_m:g} m",
-            where="bark",
-            expected=f"a least radius below {skeleton.radius.max():.3g} m",
-        )
+        raise _no_axis(skeleton, least_radius_m, strip_m)
     thickest = sorted(paths, key=lambda path: (path.axis != 0, -path.radius[0]))[:most_axes]
     kept = {path.axis for path in thickest}
     paths = [path for path in paths if path.axis in kept]
-    counts = [max(round((path.high - path.low) / strip_m), 4) for path in paths]
+    counts = [max(round((path.high - path.low) / strip_m), _FEWEST) for path in paths]
     if sum(counts) > MOST_STRIPS:
         raise InputError(
             f"{sum(counts):,} strips", where="bark", expected=f"{MOST_STRIPS:,}: wider strips"
         )
     return BarkedTree(skeleton, tuple(paths), _geometry(paths, counts))
+
+
+def _no_axis(skeleton: Skeleton, least: float, strip_m: float) -> InputError:
+    """Say why no axis has strips: all wood is too thin, or what is thick enough too short."""
+    thickest = float(skeleton.radius.max())
+    if thickest < least:
+        what = f"no wood thicker than a radius of {least:g} m"
+        expected = f"a least radius below {thickest:.3g} m"
+    else:
+        what = f"no axis of a radius of {least:g} m over {_FEWEST} strips of {strip_m:g} m"
+        expected = "narrower strips, or a smaller least radius"
+    return InputError(f"tree {skeleton.tree_id} has {what}", where="bark", expected=expected)
 
 
 def _paths(skeleton: Skeleton, least: float, strip_m: float) -> list[AxisPath]:
@@ -241,7 +263,7 @@ def _paths(skeleton: Skeleton, least: float, strip_m: float) -> list[AxisPath]:
             high=high,
         )
         low = 0.0 if base < 0 else _emerges(path, found[bearer])
-        if high - low >= 4.0 * strip_m:
+        if high - low >= _FEWEST * strip_m:
             found[int(axis)] = AxisPath(**{**path.__dict__, "low": low})
     return list(found.values())
 

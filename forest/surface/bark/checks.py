@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.surface.bark.material import Material, fracture_range
+from forest.surface.bark.strips import StripGeometry
 
 
 def checked_girths(
@@ -42,17 +43,33 @@ class Spread(NamedTuple):
         return spread
 
 
-def checked_dilatation(table: NDArray[np.float64] | None, steps: int, strips: int) -> Spread:
-    """Check a dilatation."""
+def check_strips(geometry: StripGeometry) -> None:
+    """Refuse strips whose width or place is no number, or whose width is not above 0."""
+    wide = np.isfinite(geometry.width) & (geometry.width > 0.0)
+    wide &= np.all(np.isfinite(geometry.width_around) & (geometry.width_around > 0.0), axis=1)
+    wide &= np.isfinite(geometry.along)
+    if not wide.all():
+        raise InputError(
+            f"strip {int(np.argmin(wide))} has no width or place",
+            where="bark: strips",
+            expected="metres, the width above 0",
+        )
+
+
+def checked_dilatation(
+    table: NDArray[np.float64] | None, steps: int, edges: NDArray[np.float64]
+) -> Spread:
+    """Check a dilatation of the sectors between some edges."""
     if table is None:
         return Spread(None)
+    strips, sectors = len(edges), edges.shape[1] - 1
     table = np.asarray(table, np.float64)
     shapes = ((strips,), (steps, strips))
-    if table.shape[:-1] not in shapes or table.shape[-1] < 1:
+    if table.shape[:-1] not in shapes or table.shape[-1] != sectors:
         raise InputError(
             f"a table of {table.shape}",
             where="bark: dilatation",
-            expected=f"({strips}, sectors) or ({steps}, {strips}, sectors)",
+            expected=f"({strips}, {sectors}) or ({steps}, {strips}, {sectors})",
         )
     if not np.all(np.isfinite(table) & (table >= 0.0)) or not np.all(table.sum(axis=-1) > 0.0):
         raise InputError(

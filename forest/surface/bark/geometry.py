@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.surface.bark.dressing import relief_of
-from forest.surface.bark.growing import Bark
 from forest.surface.bark.outlines import Relief, fields_at
 from forest.surface.bark.presets import Preset
 from forest.surface.bark.silhouettes import Silhouettes, silhouettes
+from forest.surface.bark.viewed import BarkView
 from forest.surface.mesh import Mesh
 
 _Floats = NDArray[np.float64]
@@ -82,7 +82,7 @@ def flat(width_m: float) -> Surface:
 
 
 def bark_geometry(
-    bark: Bark,
+    bark: BarkView,
     preset: Preset,
     surface: Surface,
     *,
@@ -98,7 +98,7 @@ def bark_geometry(
 
     Parameters
     ----------
-    bark : Bark
+    bark : BarkView
     preset : Preset
         Its depth profile and shoulders.
     surface : callable
@@ -300,7 +300,7 @@ def _triangulate(points: _Floats, edges: _Edges) -> NDArray[np.int64]:
 
 
 def _raised(
-    bark: Bark,
+    bark: BarkView,
     preset: Preset,
     surface: Surface,
     outlines: Silhouettes,

@@ -59,6 +59,39 @@ class GirthHistory(NamedTuple):
         return GirthHistory(self.times[:rows], self.girth[:rows], spread)
 
 
+def checked_history(history: GirthHistory, strips: int) -> GirthHistory:
+    """Check that a history fits some strips: what growth itself does not check.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, times that do not rise, or a strip without a girth at the end.
+    """
+    times, girth = np.asarray(history.times, np.float64), np.asarray(history.girth, np.float64)
+    rows = len(times)
+    if times.ndim != 1 or rows < 2 or not np.all(np.diff(times) > 0.0):
+        raise _refused("times that do not rise", "two or more that do")
+    if girth.shape != (rows, strips):
+        raise _refused(
+            f"girths of {girth.shape}", f"({rows}, {strips}): a row a time, a column a strip"
+        )
+    there = np.isfinite(girth) & (girth > 0.0)
+    if not there[-1].all():
+        raise _refused(f"strip {int(np.argmin(there[-1]))} has no girth at the end", "metres")
+    if np.any(np.diff(there.astype(np.int8), axis=0) < 0):
+        raise _refused("a girth that ends", "one for every time from the first on")
+    spread = history.dilatation
+    if spread is not None:
+        spread = np.asarray(spread, np.float64)
+        if spread.ndim != 3 or spread.shape[:2] != (rows - 1, strips):
+            raise _refused(f"dilatation of {spread.shape}", f"({rows - 1}, {strips}, sectors)")
+    return GirthHistory(times, girth, spread)
+
+
+def _refused(what: str, expected: str) -> InputError:
+    return InputError(what, where="bark: history", expected=expected)
+
+
 def recorded_girths(
     tree: BarkedTree, wood: YearlyWood, *, flare: Flare | None = None
 ) -> GirthHistory:
@@ -196,6 +229,15 @@ def linked_girths(
         outlines_of(shape, tree) if isinstance(shape, Mesh) else np.asarray(shape, np.float64)
         for shape in shapes
     ]
+    strips = len(tree.geometry.axis)
+    for k, outline in enumerate(outlines):
+        fits = outline.ndim == 2 and len(outline) == strips and outline.shape[1] % GROWING == 0
+        if not fits or not outline.size or not np.all(np.isfinite(outline) & (outline > 0.0)):
+            raise InputError(
+                f"shape {k} of {outline.shape} is no outline of the strips",
+                where="bark",
+                expected=f"({strips}, a multiple of {GROWING}) m above 0",
+            )
     girth = np.stack([perimeter(outline) for outline in outlines])
     if np.any(np.diff(girth, axis=0) < -1e-9):
         step, strip = (int(k[0]) for k in np.nonzero(np.diff(girth, axis=0) < -1e-9))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from forest._threads import in_threads
 from forest.errors import InputError
 from forest.surface.bark.checks import (
+    check_strips,
     check_threshold,
     checked_dilatation,
     checked_girths,
@@ -26,13 +27,11 @@ from forest.surface.bark.strips import (
     FRACTURE,
     Crossings,
     Elements,
-    Fractures,
     StripGeometry,
-    Strips,
-    Tears,
 )
 from forest.surface.bark.tables import elements_of, tables_of
-from forest.surface.bark.whole import whole_rings
+from forest.surface.bark.viewed import BarkView
+from forest.surface.bark.whole import even_edges, whole_rings
 
 #: By how much the memory of a fast year fades in the next, where the threshold is the growth ratio:
 #: bark strained in a fast year does not break up all over in a slow one.
@@ -48,7 +47,7 @@ class Snapshot(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Bark:
+class Bark(BarkView):
     """Bark at one time. Its verbs give another bark; this one stays as it is.
 
     Memory: 49 bytes an element (two to a fracture), and inside 136 bytes a possible fracture (one
@@ -56,18 +55,7 @@ class Bark:
     """
 
     geometry: StripGeometry
-    material: Material
-    seed: int
-    strips: Strips
-    elements: Elements
-    tears: Tears
-    fractures: Fractures
-    time: float  # steps since the epidermis was whole
     history: tuple[Snapshot, ...]  # one a step, where asked for
-    generation: int  # 0; 1 where the surface of another bark tore, ...
-    surface: (
-        Bark | None
-    )  # that other bark: this one's place x on the epidermis is x around its girth
     _rings: Rings
     _pace: NDArray[np.float64]  # (strips) S - 1 where S is the growth ratio
 
@@ -98,7 +86,7 @@ class Bark:
         """
         rings = copied(self._rings)
         girths = checked_girths(girth_by_step, len(rings.records), rings.girth)
-        spread = checked_dilatation(dilatation, len(girths), len(rings.records))
+        spread = checked_dilatation(dilatation, len(girths), rings.edges)
         check_threshold(self.material, np.vstack([rings.girth, girths]), rings.length, substeps)
         pace, history = self._pace.copy(), list(self.history)
         time = self.time
@@ -146,6 +134,7 @@ class Bark:
         where = (np.int64(strip), np.int64(record), place, self.time)
         crossings = self.geometry.crossings
         begin_fracture(rings, physics, np.int64(self.seed), crossings, *where)
+        _keep_untorn(rings, self._rings)
         return _seen(self, rings, self.time)
 
     def refracture(
@@ -154,6 +143,8 @@ class Bark:
         *,
         material: Material | None = None,
         seed: int | None = None,
+        dilatation: NDArray[np.float64] | None = None,
+        substeps: int = 1,
         keep: bool = False,
     ) -> Bark:
         """Let the surface be the epidermis of another bark, weak where this one tore (figure 9).
@@ -164,6 +155,15 @@ class Bark:
             The girth from now on, m.
         material : Material, optional
             That of the next generation; the same unless given.
+        seed : int, optional
+            The next one unless given.
+        dilatation, substeps, keep
+            As in `grow`. The sectors lie where growth has taken them so far.
+
+        Raises
+        ------
+        InputError
+            As for `grow_bark`, or other sectors than those in which this bark grew unevenly.
         """
         material = material or self.material
         girth = self.strips.girth
@@ -173,14 +173,13 @@ class Bark:
             x = (np.arange(samples) + 0.5) * (girth[strip] / samples)
             rows, _ = self.elements.at(strip, x)
             weakness[strip] = self.elements.kind[rows] == FRACTURE
-        bark = grow_bark(
-            self.geometry,
-            np.vstack([girth, girth_by_step]),
-            material,
-            self.seed + 1 if seed is None else seed,
-            weakness=weakness,
-            keep=keep,
-        )
+        edges = self._rings.edges
+        if edges.shape[1] == 2:  # it grew evenly
+            edges = even_edges(girth, _sectors(dilatation))
+        seed = self.seed + 1 if seed is None else seed
+        girths = checked_girths(girth_by_step, len(girth), girth)
+        bark = _whole(self.geometry, girth, material, seed, edges, weakness)
+        bark = bark.grow(girths, dilatation=dilatation, substeps=substeps, keep=keep)
         generation = self.generation + 1
         marked = np.full(len(bark.fractures.origin), generation, np.int32)
         fractures = bark.fractures._replace(generation=marked)
@@ -238,19 +237,22 @@ def grow_bark(
     Raises
     ------
     InputError
-        Shapes that do not fit, a girth that is not above 0 or shrinks, a threshold S below the
-        range of 3.2.3.
+        Shapes that do not fit, a strip without width, a girth that is not above 0 or shrinks, a
+        threshold S below the range of 3.2.3.
     """
     material = material or Material()
+    check_strips(geometry)
     strips = len(geometry.axis)
     girths = girths_from_birth(girth_by_step, strips)
     map_of = checked_weakness(weakness, strips)
-    sectors = 1 if dilatation is None else np.shape(dilatation)[-1]
-    rings = whole_rings(geometry, girths[0], material, sectors)
-    physics = Physics.of(material)
-    in_threads(weigh_all, rings, physics, np.int64(seed), map_of)
-    bark = _first(geometry, material, seed, rings)
+    edges = even_edges(girths[0], _sectors(dilatation))
+    bark = _whole(geometry, girths[0], material, seed, edges, map_of)
     return bark.grow(girths[1:], dilatation=dilatation, substeps=substeps, keep=keep)
+
+
+def _sectors(dilatation: NDArray[np.float64] | None) -> int:
+    shape = () if dilatation is None else np.shape(dilatation)
+    return shape[-1] if shape else 1
 
 
 class _Part(NamedTuple):
@@ -292,6 +294,14 @@ def _advance(
     return rings
 
 
+def _keep_untorn(rings: Rings, before: Rings) -> None:
+    """Give strips that did not tear their springs back: they still lie at equilibrium."""
+    strip_of = np.searchsorted(rings.base, np.arange(len(rings.rest)), side="right") - 1
+    same = (rings.records == before.records)[strip_of]
+    for name in ("rest", "grip_left", "grip_right"):
+        getattr(rings, name)[same] = getattr(before, name)[same]
+
+
 def _stretched(
     edges: NDArray[np.float64],
     before: NDArray[np.float64],
@@ -310,8 +320,17 @@ def _stretched(
     return stretched
 
 
-def _first(geometry: StripGeometry, material: Material, seed: int, rings: Rings) -> Bark:
+def _whole(
+    geometry: StripGeometry,
+    girth: NDArray[np.float64],
+    material: Material,
+    seed: int,
+    edges: NDArray[np.float64],
+    weakness: NDArray[np.float64],
+) -> Bark:
     """Give bark whose epidermis is whole."""
+    rings = whole_rings(geometry, girth, material, edges)
+    in_threads(weigh_all, rings, Physics.of(material), np.int64(seed), weakness)
     empty: Any = None
     bark = Bark(
         geometry=geometry._replace(crossings=_sorted(geometry.crossings)),
@@ -325,6 +344,7 @@ def _first(geometry: StripGeometry, material: Material, seed: int, rings: Rings)
         history=(),
         generation=0,
         surface=None,
+        scale=np.ones(len(rings.girth)),
         _rings=rings,
         _pace=np.zeros(len(rings.girth)),
     )

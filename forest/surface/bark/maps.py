@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from forest._threads import in_threads, thread_count
 from forest.errors import InputError, OutputError
 from forest.surface.bark.dressing import Dress, Fold, relief_of, rows_at
-from forest.surface.bark.growing import Bark
 from forest.surface.bark.light import normals, occlusion
 from forest.surface.bark.outlines import rows_of, scratch
 from forest.surface.bark.painting import Canvas, paint_all, work_for
 from forest.surface.bark.presets import Preset
 from forest.surface.bark.silhouettes import Silhouettes, silhouettes
+from forest.surface.bark.viewed import BarkView
 
 _NO_SURFACE = np.empty((0, 0, 5), np.float32)
 _LEAST, _MOST = 16, 16384  # pixels along a side
@@ -114,7 +114,7 @@ class BarkMaps:
 
 
 def bark_maps(
-    bark: Bark,
+    bark: BarkView,
     preset: Preset | Dress,
     size: int | tuple[int, int] = 4096,
     *,
@@ -130,7 +130,7 @@ def bark_maps(
 
     Parameters
     ----------
-    bark : Bark
+    bark : BarkView
     preset : Preset or Dress
         What it looks like; a `Dress` has its textures ready for many calls.
     size : int or (columns, rows)
@@ -183,7 +183,7 @@ def bark_maps(
 
 
 def _paint(
-    bark: Bark,
+    bark: BarkView,
     dress: Dress,
     shape: tuple[int, int],
     axis: int,

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.surface.bark.growing import Bark
-from forest.surface.bark.strips import Elements
+from forest.surface.bark.strips import FRACTURE, Elements
+from forest.surface.bark.viewed import BarkView
 
 
-def piece_of(bark: Bark, strips: NDArray[np.int64]) -> Bark:
-    """Give the bark of some strips alone, to be dressed; links to others end.
+def piece_of(bark: BarkView, strips: NDArray[np.int64]) -> BarkView:
+    """Give the bark of some strips alone, to be dressed; links to others end (-1).
+
+    Fractures keep their numbers, and the lengths and widths that they have on the whole bark.
 
     Parameters
     ----------
-    bark : Bark
+    bark : BarkView
     strips : int64 (k,)
         Rows of `bark.strips`, rising.
     """
@@ -47,35 +48,60 @@ def piece_of(bark: Bark, strips: NDArray[np.int64]) -> Bark:
         neighbour_up=place[cut.neighbour_up],
         neighbour_down=place[cut.neighbour_down],
     )
-    surface = None if bark.surface is None else piece_of(bark.surface, strips)
-    return replace(bark, strips=cut, elements=elements, tears=nodes, surface=surface, history=())
+    fractures = bark.fractures._replace(
+        origin=number[bark.fractures.origin],
+        first=number[bark.fractures.first],
+        last=number[bark.fractures.last],
+    )
+    return BarkView(
+        material=bark.material,
+        seed=bark.seed,
+        strips=cut,
+        elements=elements,
+        tears=nodes,
+        fractures=fractures,
+        time=bark.time,
+        generation=bark.generation,
+        surface=None if bark.surface is None else piece_of(bark.surface, strips),
+        scale=bark.scale[strips],
+    )
 
 
-def rescaled(bark: Bark, girth: NDArray[np.float64]) -> Bark:
-    """Give the same bark on strips of other girths: all that lies around them scales."""
-    factor = girth / bark.strips.girth
+def rescaled(bark: BarkView, factor: NDArray[np.float64]) -> BarkView:
+    """Show bark at another scale: the girth of each strip and all that lies around it.
+
+    Parameters
+    ----------
+    bark : BarkView
+    factor : float64 (strips)
+        On the girth. Lengths of epidermis stay what they are: nothing of it is made or lost.
+    """
     counts = np.diff(bark.elements.offsets)
     each = np.repeat(factor, counts)
     elements = bark.elements
+    torn = elements.kind == FRACTURE
     sized = elements._replace(
         start=elements.start * each,
         width=elements.width * each,
-        rest=elements.rest * each,
-        uv0=elements.uv0 * each,
+        rest=np.where(torn, elements.rest * each, elements.rest),  # a width, one step ago
     )
-    strips = bark.strips._replace(girth=girth, rest=bark.strips.rest * factor)
-    tears = bark.tears._replace(uv0=bark.tears.uv0 * factor[bark.tears.strip])
-    opened = np.flatnonzero(sized.fracture >= 0)
-    strip_of = np.repeat(np.arange(len(girth)), counts)[opened]
+    opened = np.flatnonzero(torn)
+    strip_of = np.repeat(np.arange(len(factor)), counts)[opened]
     area = np.bincount(
         sized.fracture[opened],
-        weights=sized.width[opened] * strips.width[strip_of],
+        weights=sized.width[opened] * bark.strips.width[strip_of],
         minlength=len(bark.fractures.origin),
     )
-    fractures = bark.fractures._replace(width=area / np.maximum(bark.fractures.length, 1e-12))
-    surface = None
-    if bark.surface is not None:
-        surface = rescaled(bark.surface, strips.rest)
-    return replace(
-        bark, strips=strips, elements=sized, tears=tears, fractures=fractures, surface=surface
+    width = area / np.maximum(bark.fractures.length, 1e-12)
+    return BarkView(
+        material=bark.material,
+        seed=bark.seed,
+        strips=bark.strips._replace(girth=bark.strips.girth * factor),
+        elements=sized,
+        tears=bark.tears,
+        fractures=bark.fractures._replace(width=width),
+        time=bark.time,
+        generation=bark.generation,
+        surface=None if bark.surface is None else rescaled(bark.surface, factor),
+        scale=bark.scale * factor,
     )

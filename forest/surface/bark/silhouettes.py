@@ -21,8 +21,8 @@ from scipy.sparse.csgraph import connected_components
 
 from forest._jit import njit
 from forest.errors import InputError
-from forest.surface.bark.growing import Bark
 from forest.surface.bark.strips import FRACTURE
+from forest.surface.bark.viewed import BarkView
 
 #: Ends face each other when their middles lie within so many of their mean widths.
 _HEAD_ON = 1.0
@@ -85,12 +85,12 @@ class _Ring(NamedTuple):
     own: _Floats  # length on the epidermis
 
 
-def silhouettes(bark: Bark, axis: int = 0) -> Silhouettes:
+def silhouettes(bark: BarkView, axis: int = 0) -> Silhouettes:
     """Draw the outlines of all fractures on an axis.
 
     Parameters
     ----------
-    bark : Bark
+    bark : BarkView
         Torn or whole.
     axis : int
         Which axis.
@@ -128,7 +128,7 @@ def silhouettes(bark: Bark, axis: int = 0) -> Silhouettes:
     return Silhouettes(
         knots=knots,
         girth=strips.girth[rows][of_knot],
-        rest=strips.rest[rows][of_knot],
+        rest=(strips.rest * bark.scale)[rows][of_knot],
         shift=shift[of_knot],
         offsets=np.concatenate(([0], np.cumsum(count))),
         centre=pieces.centre[order],
@@ -141,7 +141,7 @@ def silhouettes(bark: Bark, axis: int = 0) -> Silhouettes:
     )
 
 
-def _ring_of(bark: Bark, rows: _Indices) -> _Ring:
+def _ring_of(bark: BarkView, rows: _Indices) -> _Ring:
     elements, strips = bark.elements, bark.strips
     first, last = elements.offsets[rows], elements.offsets[rows + 1]
     counts = last - first
@@ -173,7 +173,7 @@ def _shift_of(ring: _Ring) -> _Floats:
     return np.asarray(np.unwrap(shift, period=1.0), np.float64)
 
 
-def _nodes_of(bark: Bark, rows: _Indices, ring: _Ring) -> _Nodes:
+def _nodes_of(bark: BarkView, rows: _Indices, ring: _Ring) -> _Nodes:
     """Gather the tears of the axis; links to other axes end here."""
     place = np.full(len(bark.strips.axis), -1, np.int64)
     place[rows] = np.arange(len(rows))

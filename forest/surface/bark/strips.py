@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.errors import InputError
+
 #: Kinds of elements.
 EPIDERMIS = 0
 FRACTURE = 1
@@ -60,7 +62,19 @@ class StripGeometry(NamedTuple):
 
     @classmethod
     def column(cls, strips: int, width_m: float) -> StripGeometry:
-        """Give the strips of one straight axis."""
+        """Give the strips of one straight axis.
+
+        Raises
+        ------
+        InputError
+            A width that is not above 0, or no strip.
+        """
+        if strips < 1 or not 0.0 < width_m < np.inf:
+            raise InputError(
+                f"{strips} strips of {width_m:g} m",
+                where="bark: strips",
+                expected="one or more, of metres above 0",
+            )
         k = np.arange(strips, dtype=np.int32)
         return cls(
             axis=np.zeros(strips, np.int32),

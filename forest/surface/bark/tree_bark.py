@@ -13,6 +13,7 @@ from forest.surface.bark.axes import LEAST_RADIUS_M, BarkedTree, lay_strips
 from forest.surface.bark.dressing import Dress, Fold
 from forest.surface.bark.girth import (
     GirthHistory,
+    checked_history,
     present_girths,
     recorded_girths,
     supposed_girths,
@@ -23,6 +24,7 @@ from forest.surface.bark.material import Material
 from forest.surface.bark.piece import piece_of, rescaled
 from forest.surface.bark.presets import Preset, at_girth
 from forest.surface.bark.shrinking import shrinking
+from forest.surface.bark.viewed import BarkView
 from forest.surface.blend.foot import Flare
 from forest.trees.skeleton import Skeleton
 
@@ -92,7 +94,10 @@ class _Stretch:
         last = bark
         if rows < len(self.first):
             last = bark.grow(self.first[rows:], dilatation=_rest(self.spread, rows))
-        torn = last.refracture(np.maximum(self.again[:rows], last.strips.girth))
+        # They begin at the first row: nothing grows in the step up to it.
+        if spread is not None:
+            spread = np.concatenate((np.ones((1, *spread.shape[1:])), spread))
+        torn = last.refracture(np.maximum(self.again[:rows], last.strips.girth), dilatation=spread)
         return replace(torn, surface=bark)
 
 
@@ -123,8 +128,8 @@ class TreeBark:
     ----------
     tree : BarkedTree
         Its axes and strips.
-    bark : Bark
-        Strips, elements, fractures; all in m, sizes as they are at this time.
+    bark : BarkView
+        Strips, elements, fractures; all in m, sizes around the girth as they are at this time.
     preset : Preset
         What it looks like.
     seed : int
@@ -133,7 +138,7 @@ class TreeBark:
     """
 
     tree: BarkedTree
-    bark: Bark
+    bark: BarkView
     preset: Preset
     seed: int
     history: GirthHistory
@@ -158,7 +163,9 @@ class TreeBark:
             self.tree, self.preset, self.seed, history, self._stretch, self._material, row
         )
 
-    def piece(self, axis: int = 0, low_m: float | None = None, high_m: float | None = None) -> Bark:
+    def piece(
+        self, axis: int = 0, low_m: float | None = None, high_m: float | None = None
+    ) -> BarkView:
         """Give the bark of a part of an axis, from `low_m` to `high_m` along it.
 
         Raises
@@ -252,6 +259,7 @@ def bark_tree(
     seed: int = 0,
     *,
     wood: YearlyWood | None = None,
+    history: GirthHistory | None = None,
     shrink: bool = False,
     law: str = "preset",
     flare: Flare | None = None,
@@ -273,6 +281,10 @@ def bark_tree(
     wood : YearlyWood, optional
         Its radii of all years (`forest.record.wood.yearly_wood`): they drive the growth. Without
         them every ring is taken to have been as wide.
+    history : GirthHistory, optional
+        Girths of your own instead, of the strips that `lay_strips` gives for the same skeleton,
+        `strip_m` and `least_radius_m`: those of shapes linked by radial projection
+        (`forest.surface.bark.girth.linked_girths`).
     shrink : bool
         Shrink the epidermis of the finished tree instead; nothing but its shape counts.
     law : str
@@ -297,12 +309,21 @@ def bark_tree(
     Raises
     ------
     InputError
-        No wood is so thick, or a parameter is out of its range.
+        No wood is so thick, a parameter is out of its range, or a history does not fit the strips
+        or stands beside wood, a root flare or shrinking.
     """
     if law not in LAWS:
         raise InputError(f"law '{law}'", where="bark", expected=" or ".join(LAWS))
     tree = lay_strips(skeleton, strip_m or preset.tearing.strip_m, least_radius_m=least_radius_m)
-    girth = present_girths(tree)
+    if history is not None:
+        if wood is not None or flare is not None or shrink:
+            raise InputError(
+                "girths of your own beside wood, a flare or shrinking",
+                where="bark: history",
+                expected="one of them",
+            )
+        history = checked_history(history, len(tree.geometry.axis))
+    girth = present_girths(tree) if history is None else history.girth[-1]
     if shrink:
         steps = np.arange(_STEPS + 1.0)
         history = GirthHistory(steps, np.tile(girth, (_STEPS + 1, 1)), None)
@@ -310,7 +331,7 @@ def bark_tree(
     else:
         if wood is not None:
             history = recorded_girths(tree, wood, flare=flare)
-        else:
+        elif history is None:
             history = supposed_girths(tree, years)
         of_law = _Stretch.conserved(history) if law == "conserved" else None
         stretch = of_law or _Stretch.by_preset(history, preset)
@@ -330,5 +351,6 @@ def _grown(
 ) -> TreeBark:
     bark = stretch.grown(tree, material, seed, row)
     now = history.girth[-1]
-    sized = rescaled(bark, np.where(np.isnan(now), bark.strips.girth, now))
+    girth = bark.strips.girth
+    sized = rescaled(bark, np.where(np.isnan(now), girth, now) / girth)
     return TreeBark(tree, sized, preset, seed, history, stretch, material)

@@ -13,10 +13,18 @@ _LEAST_SITES = 8  # vertices tied to the substrate around a ring, where it grips
 _MOST_SITES = 128
 
 
+def even_edges(girth: NDArray[np.float64], sectors: int) -> NDArray[np.float64]:
+    """Give sectors of growth that are as wide all around, (strips, sectors + 1) m."""
+    return girth[:, None] * np.linspace(0.0, 1.0, max(sectors, 1) + 1)
+
+
 def whole_rings(
-    geometry: StripGeometry, girth: NDArray[np.float64], material: Material, sectors: int
+    geometry: StripGeometry,
+    girth: NDArray[np.float64],
+    material: Material,
+    edges: NDArray[np.float64],
 ) -> Rings:
-    """Make rings of whole epidermis."""
+    """Make rings of whole epidermis; `edges` are those of the sectors of growth."""
     n = len(girth)
     length = np.floor(girth / GRAIN_M) * GRAIN_M
     sites = np.ones(n, np.int64)
@@ -42,7 +50,7 @@ def whole_rings(
         factor=np.array(geometry.width_around, np.float64),
         length=length,
         girth=girth.copy(),
-        edges=girth[:, None] * np.linspace(0.0, 1.0, sectors + 1),
+        edges=edges.copy(),
         limit=np.zeros(n),
         base=base[:-1],
         records=sites,

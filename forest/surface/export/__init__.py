@@ -7,13 +7,22 @@ from pathlib import Path
 
 from forest.errors import InputError, nearest
 from forest.record.export import whole_file
-from forest.surface.export.parts import LEAF_COLOUR, WOOD, Material, Part, leaf_parts
+from forest.surface.export.parts import LEAF_COLOUR, WOOD, Material, Part, leaf_parts, linear
 from forest.surface.mesh import Mesh
 
 #: Suffixes that `write_mesh` knows.
 SUFFIXES = (".glb", ".obj", ".ply", ".vtp")
 
-__all__ = ["LEAF_COLOUR", "SUFFIXES", "WOOD", "Material", "Part", "leaf_parts", "write_mesh"]
+__all__ = [
+    "LEAF_COLOUR",
+    "SUFFIXES",
+    "WOOD",
+    "Material",
+    "Part",
+    "leaf_parts",
+    "linear",
+    "write_mesh",
+]
 
 
 def write_mesh(

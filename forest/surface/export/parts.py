@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -19,6 +20,14 @@ Image = NDArray[np.uint8] | Path
 _LEAF_PIXELS = 256
 _NEEDLES, _NEEDLE_RISE = 22, 0.16  # pairs; how far a needle's tip is above its foot
 _FINER = 4  # pixels of the outline before it is averaged, along each side
+
+
+def linear(colour: Sequence[float]) -> tuple[float, float, float]:
+    """Give an sRGB colour, 0 to 1, as the linear one that materials have (IEC 61966-2-1)."""
+    red, green, blue = (
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in colour
+    )
+    return red, green, blue
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.surface.export.glb import _ARRAY_BUFFER, _ELEMENT_ARRAY_BUFFER, Y_UP, GltfFile
-from forest.surface.export.parts import Material, leaf_image
+from forest.surface.export.parts import Material, leaf_image, linear
 from forest.surface.mesh import Mesh
 from forest.surface.scene import Scene, Shape
 from forest.trees.leaves import LEAF_SHAPES, Leaves
@@ -232,14 +232,6 @@ class _SceneFile(GltfFile):
                 double_sided=True,
             )
         return self._known[key]
-
-
-def linear(colour: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Turn a colour as screens show it (sRGB) into the linear one that glTF reckons with."""
-    red, green, blue = (
-        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in colour
-    )
-    return red, green, blue
 
 
 def card_corners(leaves: Leaves, outline: _Floats) -> _Floats:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from forest.surface.flow.cover import Cover, Near, cover
 from forest.surface.flow.features import FlowBark, features
 from forest.surface.flow.flowing import Flow, FlowRules, Loops, flow
-from forest.surface.flow.healing import HealedYear, Wound, WoundedStem, WoundRules, heal, prune
+from forest.surface.flow.healing import HealedYear, WoundedStem, WoundRules, heal
 from forest.surface.flow.presets import (
     FeaturePreset,
     feature_preset,
@@ -16,6 +16,7 @@ from forest.surface.flow.presets import (
     preset_names,
     read_preset,
 )
+from forest.surface.flow.pruning import Wound, prune
 from forest.surface.flow.trails import Trails, angle_to_limb, grain
 
 __all__ = [

@@ -38,6 +38,7 @@ class Forces(NamedTuple):
     steering: float  # rate at which particles turn to their limb, 1/s
     lean_cos: float  # of the angle between grain and limb
     lean_sin: float
+    printed: bool  # whether Table 2 is taken as printed
 
 
 class Chain(NamedTuple):
@@ -238,7 +239,7 @@ def _mend_links(surface: Any, chain: Any, forces: Any) -> None:
 
 
 @njit
-def _part(chain: Any) -> None:
+def _part(chain: Any, forces: Any) -> None:
     """Try to relink wherever two neighbours are on different limbs."""
     for j in range(chain.tally[1]):
         a = chain.live[j]
@@ -253,7 +254,7 @@ def _part(chain: Any) -> None:
                 chain.behind,
                 chain.foot,
                 chain.heading,
-                False,
+                forces.printed,
             )
 
 
@@ -291,7 +292,7 @@ def advance(surface: Any, chain: Any, forces: Any, steps: Any) -> Any:
             return taken, flowing
         _move(surface, chain, forces)
         _mend_links(surface, chain, forces)
-        _part(chain)
+        _part(chain, forces)
         if forces.steering > 0.0:
             _mark_straddling(chain)
     return steps, flowing

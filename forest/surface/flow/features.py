@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
-from forest.surface.export import Material, Part
+from forest.surface.export import Material, Part, linear
 from forest.surface.flow.cover import Near, cover
 from forest.surface.flow.flowing import FlowRules, flow
 from forest.surface.flow.presets import Colour, FeaturePreset, Ribbons, Spots, feature_preset
@@ -62,15 +62,9 @@ class FlowBark:
         """Give pieces with materials, as `forest.surface.export.write_mesh` takes them."""
         found = []
         for name, mesh in self.pieces.items():
-            red, green, blue = (_linear(part) for part in self.colours[name])
-            material = Material(f"bark_{name}", (red, green, blue), double_sided=True)
+            material = Material(f"bark_{name}", linear(self.colours[name]), double_sided=True)
             found.append(Part(mesh, material, f"bark_{name}"))
         return found
-
-
-def _linear(part: float) -> float:
-    """Turn a part of an sRGB colour into a linear one (IEC 61966-2-1)."""
-    return part / 12.92 if part <= 0.04045 else float(((part + 0.055) / 1.055) ** 2.4)
 
 
 def quad_sizes(bark: Bark, sites: Sites) -> _Floats:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.errors import InputError
+from forest.errors import InputError, nearest
 from forest.surface.blend.field import Blend
+from forest.surface.blend.whole import READINGS
 from forest.surface.flow.chain import (
     DONE,
     FLOWING,
@@ -37,7 +38,10 @@ _START = 0.1
 
 @dataclass(frozen=True)
 class FlowRules:
-    """Constants of the chain of particles; the defaults are those of Hart & Baker 2003, 5.3.
+    """Constants of the chain of particles.
+
+    The defaults are those of Hart & Baker 2003, 5.3, but for `steering` and `readings`, which are
+    ours: ``FlowRules(steering=0.0, readings="paper")`` is the flow as printed.
 
     Attributes
     ----------
@@ -58,6 +62,15 @@ class FlowRules:
         Rate at which, in a loop that is on one limb alone, velocities turn to the direction of
         the limb (leaning by `spiral_deg`), 1/s. 0: momentum alone, as printed; then the flow
         curls on where it came onto a limb from the side.
+    readings : "corrected" or "paper"
+        Table 2 with our condition that both parts go around their limbs, or as printed; then a
+        particle that steps onto a limb can become a loop of its own.
+
+    Raises
+    ------
+    InputError
+        If a constant is not a number or out of its range, or the longest link is not longer than
+        twice the shortest.
     """
 
     steps_per_s: float = 100.0
@@ -70,6 +83,35 @@ class FlowRules:
     skeleton_damping: float = 10.0
     spiral_deg: float = 0.0
     steering: float = 2.0
+    readings: str = "corrected"
+
+    def __post_init__(self) -> None:
+        """Refuse what the chain cannot work with."""
+        for name, value in vars(self).items():
+            if name == "readings":
+                continue
+            above = name in ("steps_per_s", "speed", "greatest_link", "least_link")
+            if not math.isfinite(value):
+                raise InputError(f"{value:g}", where=f"rules.{name}", expected="a finite number")
+            if name == "spiral_deg":
+                if not -90.0 < value < 90.0:
+                    raise InputError(
+                        f"{value:g}", where="rules.spiral_deg", expected="between -90 and 90"
+                    )
+            elif value < 0.0 or (above and value == 0.0):
+                expected = "above 0" if above else "0 or more"
+                raise InputError(f"{value:g}", where=f"rules.{name}", expected=expected)
+        if not self.greatest_link > 2.0 * self.least_link:
+            raise InputError(
+                f"links from {self.least_link:g} to {self.greatest_link:g}",
+                where="rules.greatest_link",
+                expected="more than twice the shortest, so that split links are not merged again",
+            )
+        if self.readings not in READINGS:
+            raise InputError(
+                f"unknown readings {self.readings!r}, {nearest(self.readings, READINGS)}",
+                where="rules.readings",
+            )
 
     def forces(self, unit_m: float) -> Forces:
         """Give the same in metres."""
@@ -85,6 +127,7 @@ class FlowRules:
             steering=self.steering,
             lean_cos=math.cos(lean),
             lean_sin=math.sin(lean),
+            printed=self.readings == "paper",
         )
 
 
@@ -116,7 +159,7 @@ class Loops:
 
 @dataclass(frozen=True)
 class Flow:
-    """What a chain of particles left on a surface.
+    """What chains of particles left on a surface.
 
     Attributes
     ----------
@@ -140,34 +183,53 @@ class Flow:
 
 
 def _start(surface: Limbed, rules: FlowRules, unit: float) -> Chain:
-    """Lay a ring of particles around the foot."""
+    """Lay a ring of particles around the foot of each stem."""
     cones = surface.field.cones
-    grounded = np.flatnonzero(np.isfinite(cones.ground[cones.axis]) & (cones.along == 0.0))
-    foot = int(grounded[0]) if len(grounded) else 0
+    feet = np.flatnonzero(np.isfinite(cones.ground[cones.axis]) & (cones.along == 0.0))
+    feet = feet if len(feet) else np.zeros(1, np.int64)
+    radius = cones.low[feet] + cones.flare[cones.axis[feet], 1]
+    mean = 0.5 * (rules.greatest_link + rules.least_link) * unit
+    sizes = [max(6, math.ceil(2.0 * math.pi * r / mean)) for r in radius]
+    chain = empty_chain(16 * sum(sizes))
+    first = 0
+    for foot, r, n in zip(feet.tolist(), radius.tolist(), sizes, strict=True):
+        _lay_ring(surface, chain, rules, unit, foot, r, first, n)
+        first += n
+    chain.tally[:2] = first
+    return chain
+
+
+def _lay_ring(
+    surface: Limbed,
+    chain: Chain,
+    rules: FlowRules,
+    unit: float,
+    foot: int,
+    radius: float,
+    first: int,
+    n: int,
+) -> None:
+    """Put particles `first` to `first + n` around the lower end of a cone, linked in a ring."""
+    cones = surface.field.cones
     line = cones.end[foot] - cones.start[foot]
     line /= np.linalg.norm(line)
     side = np.cross(line, np.eye(3)[int(np.argmin(np.abs(line)))])
     side /= np.linalg.norm(side)
     other = np.cross(line, side)
-    radius = cones.low[foot] + cones.flare[cones.axis[foot], 1]
-    mean = 0.5 * (rules.greatest_link + rules.least_link) * unit
-    n = max(6, math.ceil(2.0 * math.pi * radius / mean))
-    chain = empty_chain(16 * n)
     base = cones.start[foot] + _START * unit * line
     lean = math.radians(rules.spiral_deg)
-    for i in range(n):
-        turn = 2.0 * math.pi * i / n
+    for k in range(n):
+        i = first + k
+        turn = 2.0 * math.pi * k / n
         x, y, z = base + radius * (math.cos(turn) * side + math.sin(turn) * other)
         chain.cone[i] = foot
         chain.state[i] = FLOWING
         put(surface, chain, np.int64(i), float(x), float(y), float(z))
         way = grain_heading(chain.normal[i], line, math.cos(lean), math.sin(lean))
         chain.velocity[i] = rules.speed * unit * np.array(way)
-        chain.ahead[i], chain.behind[i] = (i + 1) % n, (i - 1) % n
+        chain.ahead[i], chain.behind[i] = first + (k + 1) % n, first + (k - 1) % n
         chain.live[i] = i
-    chain.mother[:n] = -1
-    chain.tally[:2] = n
-    return chain
+        chain.mother[i] = -1
 
 
 def _loops(chain: Chain, time_s: float) -> Loops:
@@ -195,9 +257,10 @@ def flow(
     seconds: float | None = None,
     show_every_s: float = 0.5,
 ) -> Flow:
-    """Let a ring-shaped chain of particles flow from the foot of a tree to its tips.
+    """Let ring-shaped chains of particles flow from the feet of a tree's stems to its tips.
 
-    Hart & Baker 2003, section 5.3, with their constants. The chain parts at branchings
+    Hart & Baker 2003, section 5.3, with their constants, and a ring for each stem that stands on
+    the ground. A chain parts at branchings
     (Table 2); a link that grows too long gets a new particle. After each step particles are put
     back onto the surface, since springs of no length pull them inside.
 
@@ -223,20 +286,15 @@ def flow(
     Raises
     ------
     InputError
-        If a length is not above 0, or the longest link is not longer than twice the shortest.
+        If a length or time is not a finite number above 0.
     """
     rules = rules or FlowRules()
     surface = limbed(blend)
     cones = surface.field.cones
     unit = float(cones.low[0]) if unit_m is None else unit_m
-    if not unit > 0.0:
-        raise InputError(f"{unit:g} m", where="unit_m", expected="a length above 0")
-    if not rules.greatest_link > 2.0 * rules.least_link > 0.0:
-        raise InputError(
-            f"links from {rules.least_link:g} to {rules.greatest_link:g}",
-            where="rules.greatest_link",
-            expected="more than twice the shortest, so that split links are not merged again",
-        )
+    for name, value in (("unit_m", unit), ("seconds", seconds), ("show_every_s", show_every_s)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise InputError(f"{value:g}", where=name, expected="a finite number above 0")
     forces = rules.forces(unit)
     chain = _start(surface, rules, unit)
     far = float(np.linalg.norm(cones.end - cones.start, axis=1).sum())

@@ -2,9 +2,11 @@
 
 The paper only names the wish; the law is our own and simple. Where cambium lives, the surface
 moves outward by the year's ring. The cut face has none: a roll of woundwood closes over it from
-its rim, `closing` times as fast as the ring is wide (callus at a wound's rim grows faster than
-the stem: Neely 1988). So a face of radius r closes once the stem has grown by r / closing, and the
-dent above it is gone after twice that. A stub feeds on its stem alone and grows slower than it.
+its rim, `closing` times as fast as the wood at the rim grows (callus at a wound's rim grows faster
+than the stem: Neely 1988). That wood is the stem's after a flush cut, so that a face of radius r
+closes once the stem has grown by r / closing, and the dent above it is gone after twice that. A
+stub feeds on its stem alone and grows slower than it, and so does its woundwood until the stem
+has reached the face: protruding stubs stay open for longer.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from forest.errors import InputError
 from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
 from forest.surface.flow.cover import Cover, Near, around_limbs, cover, settle_cover
+from forest.surface.flow.pruning import Wound
 from forest.trees.skeleton import Skeleton
 
 _Floats = NDArray[np.float64]
@@ -30,28 +33,8 @@ _PROJECTIONS = 40
 #: Points at which the face is looked at, per radius.
 _FACE_ROWS = 24
 _ROUNDS_A_YEAR = 12
-
-
-@dataclass(frozen=True)
-class Wound:
-    """The face that is left where a limb was cut.
-
-    Attributes
-    ----------
-    middle : float64 (3,)
-        Middle of the face, m.
-    heading : float64 (3,)
-        Unit vector out of the wood, at right angles to the face.
-    radius_m : float
-        Radius of the face.
-    stub_m : float
-        How long the limb's rest is, from the stem's axis to the face.
-    """
-
-    middle: _Floats
-    heading: _Floats
-    radius_m: float
-    stub_m: float
+#: Least rise of the stem's surface along the limb, per metre.
+_FLATTEST = 0.1
 
 
 @dataclass(frozen=True)
@@ -61,9 +44,10 @@ class WoundRules:
     Attributes
     ----------
     closing : float
-        How far the woundwood closes in from the rim, times the width of the year's ring.
+        How far the woundwood closes in from the rim, times the growth of the wood at the rim.
     stub_growth : float
-        Growth of the wood of the stub, times that of the stem, 0 to below 1.
+        Growth of the wood of the stub, times that of the stem, 0 to below 1; at 0 a stub does
+        not close before the stem has swallowed it.
     """
 
     closing: float = 3.0
@@ -101,53 +85,6 @@ class HealedYear:
     open: NDArray[np.bool_]
 
 
-def prune(skeleton: Skeleton, axis: int, *, stub_m: float) -> tuple[Skeleton, Wound]:
-    """Cut a limb, and all that it bears, at a distance from the axis that it grows from.
-
-    Returns
-    -------
-    tuple of Skeleton, Wound
-        The tree without the limb, and the face that its rest has; the rest itself is part of the
-        wound (`WoundedStem`).
-
-    Raises
-    ------
-    InputError
-        If there is no such limb, or the cut lies beyond its tip.
-    """
-    chain = np.flatnonzero(skeleton.axis == axis)
-    if len(chain) == 0 or skeleton.parent[chain[0]] < 0:
-        raise InputError(
-            f"{axis} is no limb", where="axis", expected=f"1 to {int(skeleton.axis.max())}"
-        )
-    length = np.cumsum(skeleton.length[chain])
-    if not 0.0 < stub_m < length[-1]:
-        raise InputError(
-            f"a stub of {stub_m:g} m", where="stub_m", expected=f"above 0, below {length[-1]:.3g} m"
-        )
-    at = int(np.searchsorted(length, stub_m))
-    cut = chain[at]
-    heading = skeleton.end[cut] - skeleton.start[cut]
-    heading = heading / np.linalg.norm(heading)
-    middle = skeleton.end[cut] - (length[at] - stub_m) * heading
-    gone = np.zeros(len(skeleton), np.bool_)
-    gone[chain[0]] = True
-    for i in range(int(chain[0]) + 1, len(skeleton)):
-        gone[i] = skeleton.parent[i] >= 0 and gone[skeleton.parent[i]]
-    number = np.cumsum(~gone) - 1
-    parent = skeleton.parent[~gone]
-    rest = replace(
-        skeleton,
-        **{
-            name: getattr(skeleton, name)[~gone]
-            for name in ("start", "end", "radius", "order", "birth_year", "leafy", "serial")
-        },
-        parent=np.where(parent >= 0, number[parent], -1).astype(np.int32),
-        axis=np.unique(skeleton.axis[~gone], return_inverse=True)[1].astype(np.int32),
-    )
-    return rest, Wound(middle, heading, float(skeleton.radius[cut]), stub_m)
-
-
 @dataclass(frozen=True)
 class WoundedStem:
     """A stem with a wound, when its radius has grown by `grown_m` since the cut.
@@ -175,17 +112,26 @@ class WoundedStem:
         height = away @ self.wound.heading
         return height, np.linalg.norm(away - height[:, None] * self.wound.heading, axis=1)
 
+    @property
+    def closed_m(self) -> float:
+        """How far the woundwood has come from the rim; farther than the radius fills the dent."""
+        as_stub = min(self.grown_m, self.wound.protrusion_m)
+        fed = self.rules.stub_growth * as_stub + (self.grown_m - as_stub)
+        return self.rules.closing * fed
+
     def growth(self, points: _Floats) -> _Floats:
         """Give how far the stem's surface has moved outward at points (n,), m."""
         height, aside = self._cut_frame(points)
-        radius, closed = self.wound.radius_m, self.rules.closing * self.grown_m
+        radius, closed = self.wound.radius_m, self.closed_m
         rounded = np.hypot(aside, max(0.0, closed - radius))  # once closed, the dent fills
         behind = np.where(height > -0.5 * self.wound.stub_m, np.maximum(radius - rounded, 0.0), 0.0)
-        square = self.grown_m**2 - (behind / self.rules.closing) ** 2
-        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+        share = np.minimum(behind / max(closed, _STEP * radius), 1.0)
+        return np.asarray(self.grown_m * np.sqrt(1.0 - share**2))
 
     def _from_wood(self, points: _Floats, growth: _Floats) -> _Floats:
         """Distance from stem and stub of the year of the cut, less their growth."""
+        if self.wound.flush:
+            return np.asarray(self.stem.value(points) - growth)
         height, aside = self._cut_frame(points)
         radius = self.wound.radius_m
         out, up = aside - radius, height
@@ -242,8 +188,12 @@ class WoundedStem:
         """Tell which points of the surface lie on the face, with no wood grown over them."""
         height, aside = self._cut_frame(points)
         near = 0.01 * self.wound.radius_m
-        over = (aside < self.wound.radius_m) & (np.abs(height) < near)
-        return np.asarray(over & (self.growth(points) <= 0.0), np.bool_)
+        bare = (aside < self.wound.radius_m) & (self.growth(points) <= 0.0)
+        on_stem = np.abs(self.stem.value(points)) < near
+        if self.wound.flush:
+            return np.asarray(bare & on_stem & (height > -0.5 * self.wound.stub_m), np.bool_)
+        on_face = (np.abs(height) < near) | (on_stem & (height > 0.0))
+        return np.asarray(bare & on_face, np.bool_)
 
     def open_area(self) -> float:
         """Measure the part of the face above which no wood has grown, m2."""
@@ -252,8 +202,29 @@ class WoundedStem:
         u, v = (grid.ravel() for grid in np.meshgrid(rows, rows))
         within = np.hypot(u, v) < self.wound.radius_m
         face = self.wound.middle + u[within, None] * side + v[within, None] * other
+        face, slant = self._down_to_wood(face)
         above = self.value(face + 1e-6 * self.wound.radius_m * self.wound.heading) > 0.0
-        return float(np.pi * self.wound.radius_m**2 * np.count_nonzero(above) / len(face))
+        return float(np.pi * self.wound.radius_m**2 * slant[above].sum() / len(face))
+
+    def _down_to_wood(self, points: _Floats) -> tuple[_Floats, _Floats]:
+        """Move points of the cut's plane along the limb to where the stem's surface was.
+
+        Of a stub only those that lay within the stem. Also gives the area (n,) of the surface
+        there per area of the plane.
+        """
+        heading = self.wound.heading
+        height = np.zeros(len(points))
+        for _ in range(_PROJECTIONS):
+            place = points + height[:, None] * heading
+            rise = np.maximum(self.stem.gradient(place) @ heading, _FLATTEST)
+            off = self.stem.value(place)
+            height -= off / rise
+            if np.abs(off).max() < 1e-9 * self.wound.radius_m:
+                break
+        on_stem = (height > 0.0) | self.wound.flush
+        place = points + np.where(on_stem, height, 0.0)[:, None] * heading
+        rise = np.maximum(_unit(self.stem.gradient(place)) @ heading, _FLATTEST)
+        return place, np.where(on_stem, 1.0 / rise, 1.0)
 
     def roughness(self, points: _Floats, normals: _Floats) -> float:
         """Greatest angle between the surface over the wound and the bare stem, degrees."""
@@ -321,8 +292,8 @@ def heal(
     spacing_m : float, optional
         Distance of particles, m; by default a fifth of the wound's radius.
     reach_m : float, optional
-        How far around the wound the surface is covered, m; by default three of its radii and as
-        far as the stub stands out.
+        How far around the wound, or what has grown over it, the surface is covered, m; by
+        default three of its radii and as far as the stub stands out.
     seed : int
         Of the random numbers of splits.
 
@@ -358,6 +329,8 @@ def heal(
     years = [_year(0, surface, particles)]
     for year, ring in enumerate(rings, start=1):
         surface = replace(surface, grown_m=surface.grown_m + float(ring))
+        buried = max(surface.grown_m - wound.protrusion_m, 0.0)
+        near = Near(wound.middle + buried * wound.heading, reach)
         moved = surface.project(particles.place)
         particles = settle_cover(
             surface,
