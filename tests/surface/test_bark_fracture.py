@@ -279,7 +279,7 @@ def test_bad_fields() -> None:
         grow_bark(column(1), girth, weakness=np.full((1, 3), 2.0))
     with pytest.raises(InputError, match=r"dilatation.*below 0"):
         grow_bark(column(1), girth, dilatation=np.full((1, 3), -1.0))
-    with pytest.raises(InputError, match=r"dilatation.*\(1, sectors\)"):
+    with pytest.raises(InputError, match=r"dilatation.*a table of \(2, 3\); expected \(1, 3\)"):
         grow_bark(column(1), girth, dilatation=np.ones((2, 3)))
     with pytest.raises(InputError, match="shrink"):
         shrinking(np.ones(2), 1.5)
