@@ -17,6 +17,7 @@ from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.surface.blend.cells import Lattice, pack, unpack
 from forest.surface.blend.field import Blend, on_surface, value
+from forest.surface.mesh import Mesh
 
 _Keys = NDArray[np.int64]
 _CHUNKS = 64
@@ -245,7 +246,7 @@ def march(
     Returns
     -------
     points : float64 (n, 3)
-        On the surface, m.
+        On the surface, m; only near it if the mesh is open.
     triangles : int32 (m, 3)
         Anticlockwise from outside. Closed if no cell is missing.
     """
@@ -267,6 +268,8 @@ def march(
     most = 0.5 * np.linalg.norm(places[a] - places[b], axis=1)
     hints = hints[a]
     triangles: NDArray[np.int32] = corners.reshape(-1, 3).astype(np.int32)
+    if not Mesh(points, triangles, np.zeros((0, 3, 2))).is_watertight:
+        return points, triangles  # a cell is missing: not worth the pulling
     return _even(blend, points, triangles, most, hints), triangles
 
 
