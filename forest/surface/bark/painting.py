@@ -145,8 +145,11 @@ def _lichen_at(extras: Any, turn: Any, v: Any, cover: Any) -> Any:
 
 @njit
 def _fold_at(extras: Any, turn: Any, v: Any, girth: Any) -> Any:
-    """Height of the folds below branches: wrinkles along hyperbolas that hang from the crotch."""
-    total = 0.0
+    """Height of the folds below branches: wrinkles along hyperbolas that hang from the crotch.
+
+    Where folds of several branches meet, the strongest is seen; they do not pile up.
+    """
+    most = 0.0
     for k in range(len(extras.folds)):
         at, top, reach, height, steep = extras.folds[k]
         sideways = turn - at
@@ -161,8 +164,10 @@ def _fold_at(extras: Any, turn: Any, v: Any, girth: Any) -> Any:
         way = np.sqrt(max(inner, 0.0)) - reach
         ridge = np.exp(-0.5 * (way / (0.12 * reach)) ** 2)
         wrinkle = 0.35 * np.cos(_TURN * way / (0.3 * reach))
-        total += height * np.exp(-far) * (ridge + wrinkle)
-    return total
+        one = height * np.exp(-far) * (ridge + wrinkle)
+        if abs(one) > abs(most):
+            most = one
+    return most
 
 
 @njit

@@ -35,6 +35,7 @@ _STEPS = 20  # of shrinking
 _STEPS_BEFORE = 12  # in which what had torn before the first year on record tears
 _FOLD = 0.35  # height of a fold, in radii of the branch
 _MOST_FOLD_M = 0.015
+_FOLD_OF_STEM = 0.06  # nor more than this part of the radius of what bears the branch
 
 
 class _Stretch:
@@ -244,8 +245,9 @@ class TreeBark:
             if length < 0.1:
                 continue  # it goes straight on: there is no crotch
             crotch, turn, _ = parent.locate(place + across / length * radius)
-            height = min(_FOLD * radius, _MOST_FOLD_M)
-            found.append(Fold(float(turn[0]), float(crotch[0]), 2.0 * radius, height))
+            stem = float(parent.radius_at(crotch)[0])
+            height = min(_FOLD * radius, _MOST_FOLD_M, _FOLD_OF_STEM * stem)
+            found.append(Fold(float(turn[0]), float(crotch[0]), min(2.0 * radius, stem), height))
         return found
 
 
