@@ -24,7 +24,7 @@ $(READY): pyproject.toml
 	  echo "setup: making $(VENV) with $$($$found --version)"; \
 	  $$found -m venv $(VENV); fi
 	@echo "setup: installing the project and its tools (a few minutes the first time)"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,docs]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,docs,view]'
 	@touch $@
 
 demo: $(READY)  ## grow the Saxony spruce stand for 60 years, print its table, draw it
