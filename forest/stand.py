@@ -91,6 +91,10 @@ class Stand(management.Hand):
         How near the first trees are to the inventory that they were built from.
     treatments : Treatments
         What acts changed since the last record.
+    marks : Marks
+        The words with which trees are marked.
+    obstacles : Obstacles
+        The obstacles that stand now.
     dead_wood : DeadWood or None
         Snags and lying dead wood, where the scenario has snags.
     residual : ResidualTrees
@@ -131,9 +135,13 @@ class Stand(management.Hand):
         self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.treatments = management.Treatments(self)
+        self.marks = management.Marks()
+        self.obstacles = management.Obstacles(self)
         self.storms = Storms(scenario, self.pipe_exponent)
         self.memories: dict[str, Memory] = {
+            "obstacles": self.obstacles,
             "surroundings": self.surroundings,
+            "marks": self.marks,
             "treatments": self.treatments,
             "storms": self.storms,
         }

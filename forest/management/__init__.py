@@ -2,6 +2,7 @@
 
 from forest.management.doing import act, check_due
 from forest.management.hand import Hand
+from forest.management.shaping import Marks, Obstacles
 from forest.management.treatments import Treatments
 
-__all__ = ["Hand", "Treatments", "act", "check_due"]
+__all__ = ["Hand", "Marks", "Obstacles", "Treatments", "act", "check_due"]
