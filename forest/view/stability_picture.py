@@ -45,4 +45,5 @@ def draw_stability(trees: pd.DataFrame, to: str | Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     if len(thick):
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", fontsize=8)
-    figure.savefig(to, dpi=110)
+    with whole_file(to, overwrite=True) as draft:
+        figure.savefig(draft, dpi=110)
