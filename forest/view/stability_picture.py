@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from forest.record.export import whole_file
+
 if TYPE_CHECKING:
     import pandas as pd
 
