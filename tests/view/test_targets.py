@@ -86,7 +86,7 @@ def test_what_goes_beside_a_file_is_not_replaced(run_file: Path, tmp_path: Path)
     (tmp_path / "b" / "mine.txt").touch()
     refused(run_file, COMMANDS["mesh"], tmp_path / "a.obj", "a.mtl: exists already")
     refused(run_file, COMMANDS["scene"], tmp_path / "b.vtm", "b: exists already; expected a new")
-    words = (*COMMANDS["scene"][:-1], "--force", "--to", "")
+    words = ("scene", "RUN", "--force", "--to", "")
     refused(run_file, words, tmp_path / "b.vtm", "holds other things; expected room for the blocks")
 
 
