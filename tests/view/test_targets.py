@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from forest.errors import InputError, OutputError, span_of
@@ -164,7 +165,7 @@ def test_an_interrupted_folder_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_an_image_beside_a_mesh_is_not_replaced(tmp_path: Path) -> None:
-    bark = Material("bark", colour_image=[[[90, 80, 70]]])
+    bark = Material("bark", colour_image=np.full((2, 2, 3), 90, np.uint8))
     wood = [Part(tubes(bush(3, 8)), bark)]
     (tmp_path / "a_bark_colour.png").touch()
     with pytest.raises(InputError, match=r"a_bark_colour.png: exists already"):
