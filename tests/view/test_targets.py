@@ -1,4 +1,4 @@
-"""Where commands write: one rule for all of them, told before any work, and nothing half-written."""
+"""Where commands write: one rule for all, told before any work, and nothing half-written."""
 
 from __future__ import annotations
 
