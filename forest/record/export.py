@@ -118,10 +118,13 @@ def check_folder(folder: Path, *, where: Path) -> None:
         If nothing can be written.
     """
     if folder.exists() and not folder.is_dir():
-        what, expected = f"'{folder}' is a file", "a path in a folder"
+        what, expected = f"cannot be written: '{folder}' is a file", "a path in a folder"
         raise OutputError(what, where=str(where), expected=expected)
     if not folder.is_dir():
-        what, expected = f"there is no folder '{folder}'", "a folder that is there already"
+        what, expected = (
+            f"cannot be written: there is no folder '{folder}'",
+            "a folder that is there already",
+        )
         raise OutputError(what, where=str(where), expected=expected)
     try:
         tempfile.TemporaryFile(dir=folder).close()
