@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from forest.errors import ActError, InputError
 from forest.live.preview import preview
 from forest.live.records import tables_of, write_run
-from forest.live.saving import write_whole
 from forest.management.plan import YearOfActs, plan_year
+from forest.record.export import whole_file
 from forest.scenario.timing import Timing
 from forest.stand import Stand
 
@@ -195,8 +196,20 @@ class LiveSession:
     # ------------------------------------------------------------------ files
 
     def save(self, path: str | Path) -> None:
-        """Write the scenario that replays the session, whole or not at all."""
-        write_whole(Path(path), self.scenario.to_toml())
+        """Write the scenario that replays the session, whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written; what was there before stays.
+        """
+        with (
+            whole_file(path, overwrite=True) as draft,
+            draft.open("w", encoding="utf-8") as file,
+        ):
+            file.write(self.scenario.to_toml())
+            file.flush()
+            os.fsync(file.fileno())
 
     def write_run(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a run file of the years so far: the tables of the headless run.

@@ -44,7 +44,7 @@ def test_a_branch_is_bent_and_nothing_else(mechanics: tuple[str, ...]) -> None:
     stand = grown(*mechanics)
     before = stand.skeleton(1)
     metamer, end = limb(stand)
-    to = end + [0.03, -0.05, 0.06]
+    to = end + np.array([0.03, -0.05, 0.06])
     left = stand.bend(1, metamer, to)
     after = stand.skeleton(1)
     place = int(np.flatnonzero(before.serial == metamer)[0])
@@ -74,7 +74,7 @@ def test_a_bent_branch_stays_bent() -> None:
     unrighted = "mechanics={righting='none'}"
     stand, other = grown(unrighted), grown(unrighted)
     metamer, end = limb(stand)
-    to = end + [0.05, 0.05, 0.08]
+    to = end + np.array([0.05, 0.05, 0.08])
     stand.bend(1, metamer, to)
     bent = stand.skeleton(1)
     place = int(np.flatnonzero(bent.serial == metamer)[0])
@@ -94,7 +94,7 @@ def test_the_light_sees_the_new_place() -> None:
     """A branch that is bent gets the light of its new place in the next year."""
     one, other = grown(), grown()
     metamer, end = limb(one)
-    one.bend(1, metamer, end + [0.3, 0.0, 0.2])
+    one.bend(1, metamer, end + np.array([0.3, 0.0, 0.2]))
     steps(one, 1), steps(other, 1)
     light = []
     for stand in (one, other):
@@ -254,7 +254,8 @@ REFUSED = {
     "nothing": ("{kind='obstacle', year=2003}", "nothing to do"),
     "no place": ("{kind='bend', year=2003, tree_id=1, metamer=2}", "missing key 'to_m'"),
     "felled before": (
-        "{kind='fell', year=2002, tree_ids=[1]}, {kind='bend', year=2003, tree_id=1, metamer=2, to_m=[0,0,1]}",
+        "{kind='fell', year=2002, tree_ids=[1]},"
+        "{kind='bend', year=2003, tree_id=1, metamer=2, to_m=[0,0,1]}",
         "tree 1 is felled by acts",
     ),
 }
@@ -271,7 +272,8 @@ def test_refused_in_one_line(name: str, tmp_path: Path) -> None:
 
 
 def test_refused_in_its_year() -> None:
-    twice = f"{{kind='obstacle', years=[2002, 2003], add={WALL.replace('0.0, 2.0, 0.0', '0.0, 2.0, 3.0').replace('1.0]', '4.0]')}}}"
+    wall = "{kind='box', name='wall', min_m=[0, 2, 5], max_m=[10, 2.6, 6]}"
+    twice = f"{{kind='obstacle', years=[2002, 2003], add={wall}}}"
     stand = Stand(tiny(f"acts=[{twice}]"))
     steps(stand, 2)
     before = stand.state()
@@ -286,7 +288,8 @@ def test_a_live_bend_shows_and_replays() -> None:
     for _ in range(4):
         session.step()
     metamer, end = limb(session.stand)
-    session.act(kind="bend", tree_id=1, metamer=metamer, to_m=(end + [0.02, 0.03, 0.04]).tolist())
+    to = end + np.array([0.02, 0.03, 0.04])
+    session.act(kind="bend", tree_id=1, metamer=metamer, to_m=to.tolist())
     shown = session.skeleton(1)
     assert (shown.end != session.stand.skeleton(1).end).any()
     assert session.trees().pending.tolist() == ["bend"]
