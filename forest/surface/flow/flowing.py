@@ -77,6 +77,7 @@ class FlowRules:
     speed: float = 2.0
     greatest_link: float = 0.15
     least_link: float = 0.05
+    finest_link: float = 0.6
     spring: float = 100.0
     damping: float = 1.0
     skeleton_spring: float = 100.0
@@ -120,10 +121,12 @@ class FlowRules:
             step=1.0 / self.steps_per_s,
             greatest=self.greatest_link * unit_m,
             least=self.least_link * unit_m,
+            finest=self.finest_link,
             spring=self.spring,
             damping=self.damping,
             skeleton_spring=self.skeleton_spring,
             skeleton_damping=self.skeleton_damping,
+            speed=self.speed * unit_m,
             steering=self.steering,
             lean_cos=math.cos(lean),
             lean_sin=math.sin(lean),

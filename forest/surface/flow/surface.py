@@ -109,9 +109,9 @@ def settle(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
 
 @njit
 def foot(surface: Any, which: Any, x: Any, y: Any, z: Any) -> Any:
-    """Give the nearest point on the limb's axis (3), its heading (3), and whether it is a tip."""
+    """Give the nearest point on the limb's axis, its heading, radius, and whether it is a tip."""
     cones = surface.field.cones
-    _, _, fx, fy, fz, t = cone(cones, which, x, y, z)
+    _, radius, fx, fy, fz, t = cone(cones, which, x, y, z)
     lx = cones.end[which, 0] - cones.start[which, 0]
     ly = cones.end[which, 1] - cones.start[which, 1]
     lz = cones.end[which, 2] - cones.start[which, 2]
@@ -119,4 +119,4 @@ def foot(surface: Any, which: Any, x: Any, y: Any, z: Any) -> Any:
     axis = cones.axis[which]
     last = which + 1 == len(cones.axis) or cones.axis[which + 1] != axis
     at_tip = last and t >= 1.0 and surface.free[axis]
-    return fx, fy, fz, lx / size, ly / size, lz / size, at_tip
+    return fx, fy, fz, lx / size, ly / size, lz / size, radius, at_tip
