@@ -98,7 +98,9 @@ def with_room(chain: Chain, room: int) -> Chain:
 @njit
 def put(surface: Any, chain: Any, i: Any, x: Any, y: Any, z: Any) -> None:
     """Put a particle on the surface; its velocity keeps what is tangential."""
-    x, y, z, nx, ny, nz, off, which = settle(surface.field, x, y, z, chain.cone[i])
+    x, y, z, nx, ny, nz, off, which = settle(
+        surface.field, x, y, z, chain.cone[i], chain.normal[i]
+    )
     v = chain.velocity[i]
     across = v[0] * nx + v[1] * ny + v[2] * nz
     v[0] -= across * nx
@@ -187,6 +189,7 @@ def _put_between(surface: Any, chain: Any, a: Any, b: Any) -> None:
     chain.mother[m] = a
     for k in range(3):
         chain.velocity[m, k] = 0.5 * (chain.velocity[a, k] + chain.velocity[b, k])
+        chain.normal[m, k] = chain.normal[a, k]
     x = 0.5 * (chain.place[a, 0] + chain.place[b, 0])
     y = 0.5 * (chain.place[a, 1] + chain.place[b, 1])
     z = 0.5 * (chain.place[a, 2] + chain.place[b, 2])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ _Floats = NDArray[np.float64]
 
 #: Limbs thinner than this, in distances of quads, keep no features.
 _THINNEST = 0.5
+#: The chain flows over limbs thicker than this, in radii of the foot; thinner ones have their own grain.
+_FLOWING = 0.1
 #: Quads reach a little beyond the points that they must cover.
 _MARGIN = 1.08
 #: Points around a site at which its quad's size is measured: rings and points of each.
@@ -281,7 +283,11 @@ def features(
     blend = Blend.of(limbs_of(skeleton, thinnest_m=_THINNEST * max(spacing, 0.0)))
     trails = None
     if grain_of_flow:
-        trails = flow(blend, rules=replace(FlowRules(), spiral_deg=spiral_deg)).trails
+        thick = limbs_of(
+            skeleton,
+            thinnest_m=max(_THINNEST * spacing, _FLOWING * float(blend.limbs.cones.low[0])),
+        )
+        trails = flow(Blend.of(thick), rules=FlowRules(spiral_deg=spiral_deg)).trails
     bark = Bark(skeleton, blend, trails)
     sites = sites_of(bark, cover(blend, spacing, seed=seed, near=near), year=year, age=age)
     half = quad_sizes(bark, sites)

@@ -345,10 +345,17 @@ class _Recorder:
         self._limb: list[NDArray[np.int32]] = []
         self._off: list[_Floats] = []
         self._time: list[float] = []
+        self._ended = np.zeros(0, np.bool_)
 
     def take(self, chain: Chain, time_s: float) -> None:
+        if len(self._ended) < len(chain.live):
+            self._ended = np.append(
+                self._ended, np.zeros(len(chain.live) - len(self._ended), np.bool_)
+            )
         live = chain.live[: chain.tally[1]]
-        self._number.append(live.copy())
+        live = live[~self._ended[live]]
+        self._ended[live[chain.state[live] == DONE]] = True
+        self._number.append(live)
         self._place.append(chain.place[live])
         self._limb.append(chain.limb[live])
         self._off.append(chain.off[live])
