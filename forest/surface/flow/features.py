@@ -113,15 +113,19 @@ def background(bark: Bark, sites: Sites, half: _Floats) -> Mesh:
 def spots(
     bark: Bark, sites: Sites, half: _Floats, preset: FeaturePreset, rules: Spots, seed: int
 ) -> Mesh:
-    """Put fans of triangles on some sites: the edge on the background, the peak above it."""
+    """Put fans of triangles on some sites: the edge on the background, the peak above it.
+
+    A spot has the outline of a lenticel, a lens across the grain with pointed ends.
+    """
     luck = chances(seed, 10, sites.number)
     has = np.flatnonzero(luck[:, 0] < preset.at(rules.density, sites.age))
     age, n = sites.age[has], len(has)
     turn = 2.0 * math.pi * np.arange(_FAN) / _FAN
-    uneven = 1.0 + 0.3 * np.sin(2.0 * turn + 6.28 * luck[has, 1:2]) * luck[has, 2:3]
-    size = (0.7 + 0.6 * luck[has, 3])[:, None]
-    u = 0.5 * size * preset.at(rules.width_m, age)[:, None] * uneven * np.cos(turn)
-    v = 0.5 * size * preset.at(rules.height_m, age)[:, None] * uneven * np.sin(turn)
+    uneven = 1.0 + 0.25 * np.sin(2.0 * turn + 6.28 * luck[has, 1:2]) * luck[has, 2:3]
+    size = (0.4 + 1.2 * luck[has, 3] ** 2)[:, None]  # many small, few large
+    lens = np.sin(turn) * np.abs(np.sin(turn))  # two parabolas
+    u = 0.5 * size * preset.at(rules.width_m, age)[:, None] * np.cos(turn)
+    v = 0.5 * np.sqrt(size) * preset.at(rules.height_m, age)[:, None] * uneven * lens
     edge = sites.place[has][:, None] + (
         u[..., None] * sites.across[has][:, None] + v[..., None] * sites.along[has][:, None]
     )
@@ -185,9 +189,8 @@ def _layer(
     across = np.cross(step, out)
     across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-12)
     reach = np.linspace(-1.0, 1.0, nodes)
-    taper = np.maximum(1.0 - np.abs(reach) ** 5, 0.1)
-    wobble = 1.0 + 0.25 * np.sin(7.0 * reach[None] + 6.28 * luck[:, 2:3])
-    wide = 0.5 * preset.at(rules.width_m, age)[:, None] * taper * wobble * (0.7 + 0.6 * luck[:, 3:])
+    taper = np.maximum(1.0 - np.abs(reach) ** 3, 0.05)
+    wide = 0.5 * preset.at(rules.width_m, age)[:, None] * taper * (0.6 + 0.8 * luck[:, 3:])
     high = preset.at(rules.height_m, age)[:, None] * rules.layers[layer] * np.sqrt(taper)
     lift = _above_quads(sites, half)[has][:, None]
     columns, texture = [], []
@@ -195,7 +198,9 @@ def _layer(
         np.linalg.norm(np.diff(middle, axis=1, prepend=middle[:, :1]), axis=2), axis=1
     )
     for side, height in ((-1.0, 0.0), (_BEVEL - 1.0, 1.0), (1.0 - _BEVEL, 1.0), (1.0, 0.0)):
-        spread = side * wide
+        phase = 6.28 * luck[:, 2:3] * (3.0 if side > 0.0 else 1.0)
+        uneven = 1.0 + 0.2 * np.sin(6.0 * reach + phase) + 0.1 * np.sin(14.0 * reach + 2.0 * phase)
+        spread = side * wide * uneven
         foot = bark.blend.project((middle + spread[..., None] * across).reshape(-1, 3))
         normal = unit_normals(bark.blend, foot).reshape(n, nodes, 3)
         columns.append(foot.reshape(n, nodes, 3) + (height * high + lift)[..., None] * normal)

@@ -40,8 +40,9 @@ _START = 0.1
 class FlowRules:
     """Constants of the chain of particles.
 
-    The defaults are those of Hart & Baker 2003, 5.3, but for `steering` and `readings`, which are
-    ours: ``FlowRules(steering=0.0, readings="paper")`` is the flow as printed.
+    The defaults are those of Hart & Baker 2003, 5.3, but for `steering`, `finest_link` and
+    `readings`, which are ours: ``FlowRules(steering=0.0, finest_link=math.inf, readings="paper")``
+    is the flow as printed.
 
     Attributes
     ----------
@@ -51,6 +52,9 @@ class FlowRules:
         Speed of particles at the start, upward, units/s.
     greatest_link, least_link : float
         Longer links get a new particle, shorter ones lose one; units.
+    finest_link : float
+        Where this times the limb's radius is less than `greatest_link`, links are shorter, both
+        limits in proportion, so that thin limbs part the chain, too. `math.inf`: as printed.
     spring, damping : float
         Between linked particles, 1/s2 and 1/s.
     skeleton_spring, skeleton_damping : float
@@ -59,9 +63,9 @@ class FlowRules:
         Angle of the velocity at the start from upward; positive leans to the right seen from
         outside (a right-handed spiral).
     steering : float
-        Rate at which, in a loop that is on one limb alone, velocities turn to the direction of
-        the limb (leaning by `spiral_deg`), 1/s. 0: momentum alone, as printed; then the flow
-        curls on where it came onto a limb from the side.
+        Rate at which velocities turn to `speed` along the limb that a particle is on (leaning by
+        `spiral_deg`), 1/s. 0: momentum alone, as printed; then springs pull the chain tight
+        and it hangs in crotches, and curls on where it came onto a limb from the side.
     readings : "corrected" or "paper"
         Table 2 with our condition that both parts go around their limbs, or as printed; then a
         particle that steps onto a limb can become a loop of its own.
@@ -91,8 +95,8 @@ class FlowRules:
         for name, value in vars(self).items():
             if name == "readings":
                 continue
-            above = name in ("steps_per_s", "speed", "greatest_link", "least_link")
-            if not math.isfinite(value):
+            above = name in ("steps_per_s", "speed", "greatest_link", "least_link", "finest_link")
+            if not math.isfinite(value) and not (name == "finest_link" and value > 0.0):
                 raise InputError(f"{value:g}", where=f"rules.{name}", expected="a finite number")
             if name == "spiral_deg":
                 if not -90.0 < value < 90.0:
