@@ -110,7 +110,7 @@ def test_links_pull_like_springs_without_length() -> None:
 def test_the_chain_parts_into_two_loops_at_a_branching(rules: FlowRules, angle: float) -> None:
     found = flow(Blend.of(limbs_of(branched(angle))), rules=rules)
     assert found.relinked == 1
-    assert found.stuck <= (1 if rules.steering == 0.0 else 0)  # momentum alone may leave one
+    assert found.stuck <= (2 if rules.steering == 0.0 else 0)  # momentum alone may leave two
     counts = [len(chain) for chain in found.chains]
     assert counts == sorted(counts)
     assert counts[0] == 1 and counts[-1] == 2

@@ -98,9 +98,7 @@ def with_room(chain: Chain, room: int) -> Chain:
 @njit
 def put(surface: Any, chain: Any, i: Any, x: Any, y: Any, z: Any) -> None:
     """Put a particle on the surface; its velocity keeps what is tangential."""
-    x, y, z, nx, ny, nz, off, which = settle(
-        surface.field, x, y, z, chain.cone[i], chain.normal[i]
-    )
+    x, y, z, nx, ny, nz, off, which = settle(surface.field, x, y, z, chain.cone[i], chain.normal[i])
     v = chain.velocity[i]
     across = v[0] * nx + v[1] * ny + v[2] * nz
     v[0] -= across * nx

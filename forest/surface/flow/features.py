@@ -24,7 +24,7 @@ _Floats = NDArray[np.float64]
 
 #: Limbs thinner than this, in distances of quads, keep no features.
 _THINNEST = 0.5
-#: The chain flows over limbs thicker than this, in radii of the foot; thinner ones have their own grain.
+#: The chain flows over limbs thicker than this, in radii of the foot; others have their own grain.
 _FLOWING = 0.1
 #: Quads reach a little beyond the points that they must cover.
 _MARGIN = 1.08
@@ -126,7 +126,10 @@ def spots(
     lens = np.sin(turn) * np.abs(np.sin(turn))  # two parabolas
     u = 0.5 * size * preset.at(rules.width_m, age)[:, None] * np.cos(turn)
     v = 0.5 * np.sqrt(size) * preset.at(rules.height_m, age)[:, None] * uneven * lens
-    edge = sites.place[has][:, None] + (
+    bears = preset.at(rules.density, age)
+    shift = (luck[has, 0] / bears - 0.5) * sites.spacing_m  # sites stand in rows, spots do not
+    middle = bark.blend.project(sites.place[has] + shift[:, None] * sites.along[has])
+    edge = middle[:, None] + (
         u[..., None] * sites.across[has][:, None] + v[..., None] * sites.along[has][:, None]
     )
     edge = bark.blend.project(edge.reshape(-1, 3))
@@ -135,13 +138,13 @@ def spots(
     raised = preset.at(rules.raise_m, age)
     low = edge + np.repeat(lift, _FAN)[:, None] * out
     high = edge + np.repeat(lift + raised, _FAN)[:, None] * out
-    top = (
-        sites.place[has]
-        + (lift + raised + preset.at(rules.peak_m, age))[:, None] * sites.normal[has]
+    top = middle + (lift + raised + preset.at(rules.peak_m, age))[:, None] * unit_normals(
+        bark.blend, middle
     )
     points = np.concatenate((top, high, low))
-    around = np.stack((u, v), axis=2) + sites.uv[has][:, None]
-    uv = np.concatenate((sites.uv[has], around.reshape(-1, 2), around.reshape(-1, 2)))
+    here = sites.uv[has] + np.column_stack((np.zeros(n), shift))
+    around = np.stack((u, v), axis=2) + here[:, None]
+    uv = np.concatenate((here, around.reshape(-1, 2), around.reshape(-1, 2)))
     k = np.arange(n)[:, None]
     a = n + k * _FAN + np.arange(_FAN)
     b = n + k * _FAN + (np.arange(_FAN) + 1) % _FAN
