@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.surface.bark.axes import AxisPath
+from forest.surface.bark.collar import Collar, blended_maps, foot_of, seam_of
 from forest.surface.bark.dressing import Dress, grow_preset
 from forest.surface.bark.maps import BarkMaps, bark_maps
 from forest.surface.bark.tree_bark import TreeBark
@@ -62,6 +63,7 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
     middle = wood.points[wood.triangles].mean(axis=1)
     taken = np.zeros(len(axis), np.bool_)
     parts = []
+    axis = _borne(bark, axis, middle)
     for number, maps in bark.maps(size, dress=dress).items():
         path = bark.tree.path(number)
         low, high = _covered(bark, number)
@@ -76,6 +78,11 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
         place = place.reshape(-1, 3)
         uv = _corners(turn[place], (v[place] - low) / (high - low))
         name = f"bark_{number}"
+        if path.parent >= 0:
+            seam = np.isin(used, wood.triangles[axis == path.parent])
+            parent, shape = bark.tree.path(path.parent), maps.height.shape
+            collar = seam_of(path, parent, wood.points[used], seam, shape, low, high)
+            maps = maps if collar is None else blended_maps(bark, maps, path, collar, dress)
         mesh = Mesh(
             wood.points[used],
             place.astype(np.int32),
@@ -86,6 +93,18 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
     if not taken.all():
         parts.append(_young(bark, _kept(wood, ~taken), dress))
     return parts
+
+
+def _borne(
+    bark: TreeBark, axis: NDArray[np.int64], middle: _Floats
+) -> NDArray[np.int64]:
+    """Give triangles at a branch's foot, before its strips begin, to what bears it."""
+    axis = axis.copy()
+    for path in reversed(bark.tree.paths):
+        if path.parent >= 0:
+            of = np.flatnonzero(axis == path.axis)
+            axis[of[path.locate(middle[of])[0] < _covered(bark, path.axis)[0]]] = path.parent
+    return axis
 
 
 def displaced_parts(
@@ -140,9 +159,15 @@ def displaced_parts(
             piece, dress, (max(columns, _LEAST_PIXELS), max(rows, _LEAST_PIXELS)),
             axis=number, folds=bark.folds(number), seed=bark.seed,
         )  # fmt: skip
-        girth = np.interp(_rows(maps, low), piece.strips.along, piece.strips.girth)
         path = bark.tree.path(number)
-        mesh = _tube(path, low, girth / (2.0 * np.pi), maps, bark.tree.skeleton)
+        v = _rows(maps, low)
+        swelling = np.zeros((len(v), maps.height.shape[1]))
+        if path.parent >= 0 and low - path.low < float(piece.strips.width[0]):
+            collar, swelling = foot_of(path, bark.tree.path(path.parent), v, swelling.shape[1])
+            inner = Collar(*(column[-2:0:-1] for column in collar))
+            maps = blended_maps(bark, maps, path, inner, dress)
+        radius = np.interp(v, piece.strips.along, piece.strips.girth) / (2.0 * np.pi)
+        mesh = _tube(path, low, radius[:, None] + swelling, maps, bark.tree.skeleton)
         name = f"bark_{number}"
         parts.append(Part(mesh, material_of(maps, name, bumpy=False), name))
     if whole and axes is None and low_m is None and high_m is None:
@@ -225,7 +250,7 @@ def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton:
     place, side, across = _smooth(path, v)
     angle = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
     out = np.cos(angle)[:, None] * side[:, None] + np.sin(angle)[:, None] * across[:, None]
-    reach = np.maximum(radius[:, None] + height, 0.05 * radius[:, None])
+    reach = np.maximum(radius + height, 0.05 * radius)
     ring = (place[:, None] + reach[..., None] * out).reshape(-1, 3)
     points = np.vstack((ring, place[:1], place[-1:]))
     k, j = np.meshgrid(np.arange(rings - 1), np.arange(columns), indexing="ij")
@@ -247,7 +272,7 @@ def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton:
     share = np.concatenate((np.repeat((v - low) / maps.length_m, columns), [0.0, 1.0]))
     row = path.rows[path.internode(np.concatenate((np.repeat(v, columns), v[[0, -1]])))]
     known: dict[str, Any] = {
-        "radius_m": np.concatenate((np.repeat(radius, columns), radius[[0, -1]])),
+        "radius_m": np.concatenate((radius.ravel(), radius[[0, -1], 0])),
         "order": skeleton.order[row],
         "birth_year": skeleton.birth_year[row],
         "tree_id": np.full(len(points), skeleton.tree_id),
