@@ -24,6 +24,7 @@ _Floats = NDArray[np.float64]
 _TILE_PIXELS = 512
 _MOST_PIXELS = 16384
 _LEAST_PIXELS = 16
+_SUNK = 0.6  # radii by which a branch reaches into its parent below its bark
 _ON_AXIS = 0.01  # radii: nearer to the axis a point has no side
 
 
@@ -95,9 +96,7 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
     return parts
 
 
-def _borne(
-    bark: TreeBark, axis: NDArray[np.int64], middle: _Floats
-) -> NDArray[np.int64]:
+def _borne(bark: TreeBark, axis: NDArray[np.int64], middle: _Floats) -> NDArray[np.int64]:
     """Give triangles at a branch's foot, before its strips begin, to what bears it."""
     axis = axis.copy()
     for path in reversed(bark.tree.paths):
@@ -161,13 +160,17 @@ def displaced_parts(
         )  # fmt: skip
         path = bark.tree.path(number)
         v = _rows(maps, low)
-        swelling = np.zeros((len(v), maps.height.shape[1]))
+        deep = np.zeros((len(v), maps.height.shape[1]))
         if path.parent >= 0 and low - path.low < float(piece.strips.width[0]):
-            collar, swelling = foot_of(path, bark.tree.path(path.parent), v, swelling.shape[1])
-            inner = Collar(*(column[-2:0:-1] for column in collar))
-            maps = blended_maps(bark, maps, path, inner, dress)
-        radius = np.interp(v, piece.strips.along, piece.strips.girth) / (2.0 * np.pi)
-        mesh = _tube(path, low, radius[:, None] + swelling, maps, bark.tree.skeleton)
+            v = np.concatenate((_sunk(path, low, cell_m), v))
+            collar, deep = foot_of(path, bark.tree.path(path.parent), v, deep.shape[1])
+            shown = slice(-2, -2 - len(maps.height), -1)  # rows of the map, from the top
+            collar = Collar(*(column[shown] for column in collar))
+            maps = blended_maps(bark, maps, path, collar, dress)
+        radius = np.interp(v, piece.strips.along, piece.strips.girth)[:, None] / (2.0 * np.pi)
+        # It shrinks from its parent's surface inward, so that it does not show in cracks.
+        radius = np.maximum(radius - deep, 0.3 * radius)
+        mesh = _tube(path, v, radius, maps, bark.tree.skeleton)
         name = f"bark_{number}"
         parts.append(Part(mesh, material_of(maps, name, bumpy=False), name))
     if whole and axes is None and low_m is None and high_m is None:
@@ -241,12 +244,22 @@ def _rows(maps: BarkMaps, low: float) -> _Floats:
     return low + maps.length_m * np.concatenate(([0.0], middles, [1.0]))
 
 
-def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton: Skeleton) -> Mesh:
-    """Lay a closed tube with a point for each pixel of a map, raised by its height."""
+def _sunk(path: AxisPath, low: float, cell_m: float) -> _Floats:
+    """Where a branch has rings below its map, so that it stands in its parent's cracks, m."""
+    deepest = max(low - _SUNK * float(path.radius_at(np.array([low]))[0]), 0.0)
+    return np.linspace(deepest, low, int(np.ceil((low - deepest) / cell_m)), endpoint=False)
+
+
+def _tube(path: AxisPath, v: _Floats, radius: _Floats, maps: BarkMaps, skeleton: Skeleton) -> Mesh:
+    """Lay a closed tube with a point for each pixel of a map, raised by its height.
+
+    `v` are its rings, m: any below the map, its lower end, the middles of its rows, its upper end.
+    """
     height = maps.height_m[::-1]
-    height = np.vstack((height[:1], height, height[-1:]))
+    below = len(v) - 1 - len(height)
+    height = np.vstack((np.repeat(height[:1], below, axis=0), height, height[-1:]))
     rings, columns = height.shape
-    v = _rows(maps, low)
+    low = v[below - 1]
     place, side, across = _smooth(path, v)
     angle = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
     out = np.cos(angle)[:, None] * side[:, None] + np.sin(angle)[:, None] * across[:, None]
@@ -269,7 +282,8 @@ def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton:
         )
     )
     turn = np.concatenate((np.tile((one + 0.5) / columns, rings), [np.nan, np.nan]))
-    share = np.concatenate((np.repeat((v - low) / maps.length_m, columns), [0.0, 1.0]))
+    share = np.maximum((v - low) / maps.length_m, 0.0)
+    share = np.concatenate((np.repeat(share, columns), [0.0, 1.0]))
     row = path.rows[path.internode(np.concatenate((np.repeat(v, columns), v[[0, -1]])))]
     known: dict[str, Any] = {
         "radius_m": np.concatenate((radius.ravel(), radius[[0, -1], 0])),

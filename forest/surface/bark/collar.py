@@ -29,8 +29,6 @@ _Floats = NDArray[np.float64]
 _FOLDED = 0.8  # how far in the parent's bark is folded up over a collar, radii of the branch
 _LONGEST = 4.0  # radii along the branch; a steep one runs long beside its parent
 _MARGIN = 8  # strips of the parent beyond what is looked up
-_SWELL = 0.6  # height of the swelling at the foot, in `_SWELLING`
-_SWELLING = 0.35  # radii of the branch over which it swells
 _LEAST_PIXELS = 16
 
 
@@ -51,7 +49,7 @@ class Collar(NamedTuple):
 
 
 def foot_of(path: AxisPath, parent: AxisPath, v: _Floats, columns: int) -> tuple[Collar, _Floats]:
-    """Give the collar of a round branch on a round parent, and how it swells.
+    """Give the collar of a round branch on a round parent.
 
     Parameters
     ----------
@@ -65,7 +63,7 @@ def foot_of(path: AxisPath, parent: AxisPath, v: _Floats, columns: int) -> tuple
     Returns
     -------
     (Collar, float64 (rows, columns))
-        Arrays are (rows, columns); the swelling in m.
+        Its arrays are (rows, columns). Beside it, how deep in the parent each point is, m.
     """
     turn = (np.arange(columns) + 0.5) / columns
     rings = np.repeat(v, columns)
@@ -76,11 +74,9 @@ def foot_of(path: AxisPath, parent: AxisPath, v: _Floats, columns: int) -> tuple
     foot = float(path.radius_at(np.array([path.low]))[0])
     way = np.maximum(beyond / foot, (rings - path.low) / (_LONGEST * foot) - 0.5)
     found = _folded(path, parent, rings, turns, radius, np.clip(way, 0.0, 1.0))
-    near = np.clip(1.0 - beyond / (_SWELLING * foot), 0.0, 1.5)
-    swelling = _SWELL * _SWELLING * foot * near * near
     shape = len(v), columns
-    collar = Collar(*(column.reshape(shape) for column in (found.share, found.v, found.turn)))
-    return collar, swelling.reshape(shape)
+    collar = Collar(*(column.reshape(shape) for column in found))
+    return collar, np.maximum(-beyond, 0.0).reshape(shape)
 
 
 def seam_of(
@@ -124,7 +120,7 @@ def seam_of(
     along, around, _ = parent.locate(place + (points[near] - place) * inward[:, None])
     centre = parent.locate(path.frame(np.array([path.low]))[0])[1][0]
     values = np.column_stack((way[near], along, (around - centre + 0.5) % 1.0 - 0.5))
-    where = np.vstack([where + (shift, 0.0) for shift in (-1.0, 0.0, 1.0)])
+    where = np.vstack([where + np.array((shift, 0.0)) for shift in (-1.0, 0.0, 1.0)])
     values = np.tile(values, (3, 1))
     rows, columns = shape
     rings = low + (rows - np.arange(rows) - 0.5) * ((high - low) / rows)
