@@ -102,7 +102,11 @@ def _borne(bark: TreeBark, axis: NDArray[np.int64], middle: _Floats) -> NDArray[
     for path in reversed(bark.tree.paths):
         if path.parent >= 0:
             of = np.flatnonzero(axis == path.axis)
-            axis[of[path.locate(middle[of])[0] < _covered(bark, path.axis)[0]]] = path.parent
+            of = of[path.locate(middle[of])[0] < _covered(bark, path.axis)[0]]
+            parent = bark.tree.path(path.parent)
+            along, _, away = parent.locate(middle[of])
+            # What lies deep in it, the foot of a tube, has no place on its surface.
+            axis[of[away > 0.8 * parent.radius_at(along)]] = path.parent
     return axis
 
 
