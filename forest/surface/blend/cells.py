@@ -164,14 +164,14 @@ def _thinnest(field: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
 def _judge(
     first: Any, step: Any, field: Any, centre: Any, reach: Any, slope: Any, near: Any, thin: Any
 ) -> None:
-    """Tell which cells the surface may pass, and how thin the thinnest limb there is."""
+    """Tell which cells the surface may pass, and, if asked, how thin the thinnest limb there is."""
     for c in range(first, _CHUNKS, step):
         hint = np.int64(0)
         for i in range(len(centre) * c // _CHUNKS, len(centre) * (c + 1) // _CHUNKS):
             p = centre[i]
             f, hint = value(field, p[0], p[1], p[2], hint)
             near[i] = abs(f) <= slope * reach
-            if near[i]:
+            if near[i] and len(thin):
                 thin[i] = _thinnest(field, p[0], p[1], p[2], 1.2 * reach)
 
 
@@ -189,9 +189,10 @@ class _Octree:
         self.leaves: list[_Keys] = [np.zeros(0, np.int64) for _ in range(lattice.levels)]
 
     def judge(self, keys: _Keys, level: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-        """Tell which cells matter, and the thinnest limb in each."""
+        """Tell which cells matter, and the thinnest limb in each but the smallest."""
         centre = self.lattice.places(unpack(keys) + (1 << level))
-        near, thin = np.zeros(len(keys), np.bool_), np.full(len(keys), np.inf)
+        near = np.zeros(len(keys), np.bool_)
+        thin = np.full(len(keys) if level else 0, np.inf)  # the smallest cells are not cut
         reach = np.sqrt(3.0) * self.lattice.unit * (1 << level)
         in_threads(_judge, self.blend.kernel, centre, reach, self.slope, near, thin)
         return near, thin
@@ -206,11 +207,14 @@ class _Octree:
         cell = 2.0 * self.lattice.unit
         while len(keys):
             near, thin = self.judge(keys, level)
-            keys, thin = keys[near], thin[near]
+            keys = keys[near]
             if level >= self.lattice.levels:
                 cut = np.ones(len(keys), np.bool_)
+            elif level == 0:
+                self.leaves[0] = np.union1d(self.leaves[0], keys)
+                break
             else:
-                cut = (level > 0) & (cell * (1 << level) * self.in_radius > thin * (1.0 + 1e-9))
+                cut = cell * (1 << level) * self.in_radius > thin[near] * (1.0 + 1e-9)
                 self.leaves[level] = np.union1d(self.leaves[level], keys[~cut])
             keys = self.split(keys[cut], level)
             level -= 1
