@@ -176,9 +176,6 @@ def _judge(
 
 
 _CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], np.int64)
-_AROUND = np.array(
-    [[i, j, k] for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], np.int64
-)
 
 
 class _Octree:
@@ -219,6 +216,18 @@ class _Octree:
             keys = self.split(keys[cut], level)
             level -= 1
 
+    def touched(self, grid: NDArray[np.int64], size: int, level: int) -> NDArray[np.bool_]:
+        """Tell which leaves of a level hold one of, or touch, smaller cells of width `size`."""
+        wide = 1 << (level + 1)
+        low, high = (grid - size) // wide * wide, (grid + size) // wide * wide
+        leaves = self.leaves[level]
+        hit = np.zeros(len(leaves), np.bool_)
+        for upward in _CORNERS if len(leaves) else ():
+            keys = pack(np.where(upward, high, low))
+            at = np.minimum(np.searchsorted(leaves, keys), len(leaves) - 1)
+            hit[at[leaves[at] == keys]] = True
+        return hit
+
     def balance(self) -> None:
         """Cut cells until none touches one that is less than half as wide."""
         held = np.zeros(0, np.int64)  # cells of the level, with those that were cut
@@ -226,12 +235,9 @@ class _Octree:
             held = np.union1d(held, self.leaves[level])
             size = 1 << (level + 2)  # of a parent, in units
             parents = np.unique(pack(unpack(held) // size * size))
-            grid = unpack(parents)[:, None, :] + _AROUND[None] * size
-            around = np.unique(pack(grid.reshape(-1, 3)))
+            grid = unpack(parents)
             for upper in range(self.lattice.levels - 1, level + 1, -1):
-                wide = 1 << (upper + 1)
-                touched = np.unique(pack(unpack(around) // wide * wide))
-                hit = np.isin(self.leaves[upper], touched)
+                hit = self.touched(grid, size, upper)
                 children = self.split(self.leaves[upper][hit], upper)
                 self.leaves[upper] = self.leaves[upper][~hit]
                 near, _ = self.judge(children, upper - 1)

@@ -47,7 +47,7 @@ def _find(points: _Keys, keys: _Keys) -> _Keys:
     return np.where(points[at] == keys, at, -1)
 
 
-def _members(points: _Keys, leaves: list[_Keys], inside: NDArray[np.bool_]) -> NDArray[np.int32]:
+def members_of(points: _Keys, leaves: list[_Keys], inside: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Give the 27 points, -1 where there is none, of each cell that the surface may cross."""
     rows = []
     for level, keys in enumerate(leaves):
@@ -104,19 +104,44 @@ def march(
     places = lattice.places(unpack(keys))
     f, near = np.empty(len(places)), np.empty(len(places), np.int64)
     in_threads(_values, blend.kernel, places, f, near)
-    members = _members(keys, leaves, f < 0.0)
+    members = members_of(keys, leaves, f < 0.0)
     del keys
-    points, room, hints, record, cells = _vertices(members, f, places, near, lattice.unit)
-    del members, places
+    points, triangles, room, hints = sheets(members, f, places, near, lattice.unit)
+    del members, places, f, near
+    return _even(blend, points, triangles, room, hints), triangles
+
+
+def sheets(
+    members: NDArray[np.int32],
+    f: NDArray[np.float64],
+    places: NDArray[np.float64],
+    near: _Keys,
+    unit: float,
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64], _Keys]:
+    """Part the lattice points inside from those outside by triangles.
+
+    Parameters
+    ----------
+    members : int32 (cells, 27)
+        Lattice points of each cell, -1 where there is none.
+    f, places, near : arrays (n,), (n, 3), (n,)
+        Values at lattice points, negative inside; where they lie, m; and the cones nearest to them.
+    unit : float
+        Half the width of the smallest cell, m.
+
+    Returns
+    -------
+    tuple
+        Points, triangles, how far each point may be moved at a time (m), and a cone near each.
+    """
+    points, room, hints, record, cells = _vertices(members, f, places, near, unit)
     middle, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
     made, count = polygons(record, f, points, cells, middle, triangles)
     middle, triangles = np.empty((made, 3)), np.empty((count, 3), np.int32)
     polygons(record, f, points, cells, middle, triangles)
-    del record
-    points = np.concatenate((points, middle))
-    room = np.concatenate((room, np.full(made, 0.5 * lattice.unit)))
+    room = np.concatenate((room, np.full(made, 0.5 * unit)))
     hints = np.concatenate((hints, np.zeros(made, np.int64)))
-    return _even(blend, points, triangles, room, hints), triangles
+    return np.concatenate((points, middle)), triangles, room, hints
 
 
 def _vertices(
