@@ -25,7 +25,7 @@ from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
 _Keys = NDArray[np.int64]
 
 #: A cell is at most this part of the radius of a limb whose surface may pass it.
-CELLS_IN_RADIUS = 3.0
+CELLS_IN_RADIUS = 4.0
 #: The greatest slope of the field that cells reckon with; raised where the mesh is not closed.
 SLOPE = 1.3
 #: Bytes that a cell takes while its surface is made.

@@ -174,7 +174,7 @@ def _vertices(
 
 
 #: Rounds in which vertices move towards the middle of their neighbours, along the surface.
-_ROUNDS = 2
+_ROUNDS = 4
 
 
 def _even(

@@ -109,7 +109,7 @@ def blended(
     skeleton : Skeleton
         The tree, whoever made it.
     cell_m : float, optional
-        Width of the smallest cell, m; thicker limbs have cells up to a third of their radius, and
+        Width of the smallest cell, m; thicker limbs have cells up to a quarter of their radius, and
         what is thinner than two and a half cells in radius is a tube of few sides, welded in.
         Without it a tenth of the radius at the ground, but 1 mm to 2 cm.
     reaction : Reaction, optional
