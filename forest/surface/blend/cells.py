@@ -29,7 +29,7 @@ CELLS_IN_RADIUS = 4.0
 #: The greatest slope of the field that cells reckon with; raised where the mesh is not closed.
 SLOPE = 1.3
 #: Bytes that a cell takes while its surface is made.
-BYTES_PER_CELL = 3000
+BYTES_PER_CELL = 700
 _CHUNKS = 64
 _BITS = 21
 _MASK = (1 << _BITS) - 1

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError, nearest
 from forest.surface.blend.cells import CELLS_IN_RADIUS, SLOPE, cells_near, check_memory, lattice_of
-from forest.surface.blend.cones import Reaction, check, limbs_of
+from forest.surface.blend.cones import Reaction, limbs_of, sound
 from forest.surface.blend.crossings import crossings
 from forest.surface.blend.field import Blend
 from forest.surface.blend.foot import Flare, usual_flare
+from forest.surface.blend.odd import refuse_buried, tell_gaps
 from forest.surface.blend.polygonise import march
 from forest.surface.blend.twigs import Twigs, twigs_of
 from forest.surface.blend.unrolled import unroll
@@ -37,7 +38,7 @@ class CrossingWarning(UserWarning):
 
 def usual_cell(skeleton: Skeleton) -> float:
     """Give the cell's width for a tree of this size, m."""
-    check(skeleton)
+    skeleton = sound(skeleton)
     base = float(skeleton.radius[skeleton.parent < 0].max(initial=0.0))
     return float(np.clip(_USUAL_PART * base, _USUAL_LEAST, _USUAL_MOST))
 
@@ -72,7 +73,7 @@ def blend_of(
     """
     if readings not in READINGS:
         raise InputError(f"unknown readings {readings!r}, {nearest(readings, READINGS)}")
-    check(skeleton)
+    skeleton = sound(skeleton)
     if isinstance(flare, str):
         if flare != "usual":
             raise InputError(f"unknown flare {flare!r}", expected="'usual', None or a Flare")
@@ -121,8 +122,8 @@ def blended(
     cells_in_radius : float
         How many cells, at least, the radius of a thick limb is.
     strict : bool
-        Whether to refuse limbs that cross away from a joint, or pass so near to each other that
-        their surfaces merge; else they are warned of.
+        Whether to refuse limbs that start off their parent, cross away from a joint, or pass so
+        near to each other that their surfaces merge; else they are warned of.
 
     Returns
     -------
@@ -133,20 +134,22 @@ def blended(
     Raises
     ------
     InputError
-        If the skeleton has no surface, the cells are too large for the tree or too small for the
-        memory (said before anything is made), limbs cross or touch and `strict` is set, or the
-        surface is not closed with cells of this width.
+        If the skeleton has no surface, a stem grows down from its base, the cells are too large
+        for the tree or too small for the memory (said before anything is made), limbs cross, touch
+        or start off their parent and `strict` is set, or the surface is not closed with cells of
+        this width.
 
     Notes
     -----
     Hart & Baker 2003, sections 5.1 and 5.2, eqs 26 to 31.
     """
-    check(skeleton)
+    skeleton = sound(skeleton)
     cell_m = usual_cell(skeleton) if cell_m is None else float(cell_m)
     if not (np.isfinite(cell_m) and cell_m > 0.0):
         raise InputError(f"a cell of {cell_m} m", where="cell_m", expected="a width above 0")
     if not 1.0 <= cells_in_radius <= 50.0:
         raise InputError(f"{cells_in_radius}", where="cells_in_radius", expected="1 to 50")
+    tell_gaps(skeleton, strict)
     blend = blend_of(
         skeleton,
         thinnest_m=THINNEST * cell_m,
@@ -154,6 +157,7 @@ def blended(
         flare=flare,
         readings=readings,
     )
+    refuse_buried(blend.limbs.cones)
     check_memory(blend.limbs.cones, cell_m, cells_in_radius)
     crossed = _tell_crossings(blend, strict)
     points, triangles, handles = _closed(blend, cell_m, cells_in_radius)
