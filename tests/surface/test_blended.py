@@ -195,7 +195,7 @@ def test_limbs_that_touch_without_crossing_are_told() -> None:
 def test_what_is_thick_but_has_no_length_needs_smaller_cells() -> None:
     knob = tree([-1, 0], [(0, 0, 0), (0, 0, 0), (0, 0, 1)], [0.1, 0.03], [True, True])
     with pytest.raises(InputError, match=r"thickest internode has a radius of 0\.03 m"):
-        blended(knob, cell_m=0.05)
+        blended(knob, cell_m=0.03)
     sound(blended(knob, cell_m=0.012))
 
 
