@@ -64,7 +64,12 @@ def test_whatever_crosses_is_closed(seed: int, n: int) -> None:
     long = skeleton.length > 1e-9
     if not long.any():
         return
-    sound(blended(skeleton, cell_m=0.39 * skeleton.radius[long].max()))
+    try:
+        mesh = blended(skeleton, cell_m=0.39 * skeleton.radius[long].max())
+    except InputError as error:
+        assert "grows from its base" in str(error)  # straight down
+        return
+    sound(mesh)
 
 
 def test_volume_goes_to_that_of_the_cone() -> None:
