@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 from forest.errors import InputError
 from forest.viewer.colours import CHOICES, colour_trees
@@ -102,6 +102,7 @@ class App:
                 "chosen": None,
                 "branches": False,
                 "branches_known": False,
+                "alone": False,
                 "tool": "pick",
                 "tool_list": [],
                 "tool_drags": False,
@@ -143,7 +144,8 @@ class App:
         known = self.source.with_branches(self.year)
         state.branches_known = bool(known)
         shapes = [self.source.skeleton(tree, self.year) for tree in known] if state.branches else []
-        self.stage.show_trees(self.trees, self.colours, shapes)
+        alone = self.chosen if state.alone else None
+        self.stage.show_trees(self.trees, self.colours, shapes, alone=alone)
         self.refresh()
 
     def show_colours(self) -> None:
@@ -156,7 +158,11 @@ class App:
     def choose(self, tree_id: int | None) -> None:
         """Choose a tree, or none."""
         self.state.chosen = tree_id
+        if tree_id is None:
+            self.state.alone = False
         self.stage.choose(tree_id)
+        if self.state.alone:
+            self.show_year()
         if tree_id is not None:
             self.state.tab = "tree"
         self.refresh()
@@ -191,6 +197,7 @@ class App:
         state, trigger = self.state, self.server.controller.trigger
         state.change("step")(lambda **_: self._soon(self.show_year))
         state.change("branches")(lambda **_: self._soon(self.show_year))
+        state.change("alone")(lambda **_: self._soon(self.show_year))
         state.change("colour_by")(lambda **_: self._soon(self.show_colours))
         state.change("playing")(lambda **_: self._play())
         state.change("tool")(lambda **_: self._take_tool())
@@ -264,9 +271,10 @@ class App:
         """Take a press, move or release of the pointer, at pixels of a view of this size."""
         tool = self.tools[self.state.tool]
         if kind == "down":
-            self._pressed = (across, down, self.stage.hit(across / width, down / height, pressure))
+            hit = self.stage.hit(across / width, down / height, pressure)
+            self._pressed = (across, down, hit)
             if tool.drags:
-                self._tried(lambda: tool.drag(self._pressed[2], self._pressed[2], done=False))
+                self._tried(lambda: tool.drag(hit, hit, done=False))
             return
         if self._pressed is None:
             return

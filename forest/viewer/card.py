@@ -75,6 +75,14 @@ class TreeCard:
             "Click a tree in the view or on the map.", v_if=("chosen === null",), classes="quiet"
         )
         with html.Div(v_if=("chosen !== null",)):
+            v.VSwitch(
+                v_model=("alone",),
+                label="Show this tree alone",
+                density="compact",
+                hide_details=True,
+                color="primary",
+                id="alone",
+            )
             html.Div(v_html=("card_html",), id="card")
             html.H3("Disc")
             with html.Div(classes="d-flex align-center"):

@@ -19,7 +19,8 @@ LOOPBACK = ("localhost", "127.0.0.1", "::1")
 _POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
-    "connect-src 'self' ws://localhost:{port} ws://127.0.0.1:{port} data: blob:; worker-src 'self' blob:; "
+    "connect-src 'self' ws://localhost:{port} ws://127.0.0.1:{port} data: blob:; "
+    "worker-src 'self' blob:; "
     "frame-ancestors 'none'; form-action 'none'; base-uri 'self'"
 )
 
@@ -51,7 +52,6 @@ def guard(port_of: Callable[[], int]) -> Any:
     """
     from aiohttp import web
 
-    @web.middleware
     async def refuse_strangers(
         request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
@@ -67,4 +67,4 @@ def guard(port_of: Callable[[], int]) -> Any:
             response.headers["Referrer-Policy"] = "no-referrer"
         return response
 
-    return refuse_strangers
+    return web.middleware(refuse_strangers)

@@ -29,7 +29,7 @@ html { overflow: hidden !important; }
 body { font-family: Roboto, "Helvetica Neue", Arial, sans-serif; color: #2f3a33; }
 .view { position: relative; height: 100%; width: 100%; overflow: hidden; background: #dde6ea; }
 .legend { position: absolute; left: 14px; bottom: 14px; background: rgba(255,255,255,.88);
-  border-radius: 6px; padding: 8px 12px; font-size: 12.5px; pointer-events: none; max-width: 260px; }
+  border-radius: 6px; padding: 8px 12px; font-size: 12.5px; pointer-events: none; }
 .legend b { font-weight: 500; }
 .swatch { display: inline-block; width: 11px; height: 11px; border-radius: 50%; margin-right: 7px; }
 .ramp { height: 10px; width: 200px; border-radius: 3px; margin: 5px 0 2px; }
@@ -167,7 +167,8 @@ def _view(app: App, html: Any) -> None:
         v_if=("tool_drags",),
         classes="catcher",
         raw_attrs=[
-            f'@pointerdown="$event.button === 0 && ($event.target.setPointerCapture($event.pointerId), {_pointer("down")})"',
+            '@pointerdown="$event.button === 0 && '
+            f'($event.target.setPointerCapture($event.pointerId), {_pointer("down")})"',
             f'@pointermove="$event.buttons & 1 && {_pointer("move")}"',
             f'@pointerup="$event.button === 0 && {_pointer("up")}"',
         ],
@@ -190,7 +191,7 @@ def _view(app: App, html: Any) -> None:
 def _panels(app: App, v: Any, html: Any) -> None:
     with v.VTabs(v_model=("tab",), density="compact", grow=True, color="primary"):
         for panel in app.panels:
-            v.VTab(panel.title, value=panel.title.lower(), prepend_icon=panel.icon, min_width=40)
+            v.VTab(panel.title, value=panel.title.lower(), min_width=40)
     v.VDivider()
     for panel in app.panels:
         name = panel.title.lower()

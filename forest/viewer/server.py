@@ -136,7 +136,6 @@ def _protect(server: Any, port: int) -> None:
 
     page = Path(server.config["static"]["/"]) / "index.html"
 
-    @web.middleware
     async def root(
         request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
@@ -146,4 +145,4 @@ def _protect(server: Any, port: int) -> None:
             return web.json_response({"sessionURL": f"ws://{request.host}/ws"})
         return await handler(request)
 
-    server.app.middlewares.extend([guard(lambda: port), root])
+    server.app.middlewares.extend([guard(lambda: port), web.middleware(root)])

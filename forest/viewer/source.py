@@ -102,6 +102,9 @@ class Source(Protocol):
         Its own `year` says which year it is.
         """
 
+    def stand_year(self, year: int) -> int:
+        """The year of `stand_near`, without making the stand; InputError if there is none."""
+
 
 class RunSource:
     """A run file, read as it is asked for.
@@ -193,16 +196,23 @@ class RunSource:
 
     def stand_near(self, year: int) -> Stand:
         """The stand of the checkpoint that is nearest to a year."""
+        return self._restored(self._checkpoint(year)[1])
+
+    def stand_year(self, year: int) -> int:
+        """Year of that checkpoint."""
+        return self._checkpoint(year)[0]
+
+    def _checkpoint(self, year: int) -> tuple[int, Path]:
         from forest.record.checkpoint import checkpoint_paths, step_of
 
-        paths = checkpoint_paths(self._run.path)
-        if not paths:
+        first = self.scenario.start_year - 1
+        found = [(first + step_of(path), path) for path in checkpoint_paths(self._run.path)]
+        if not found:
             raise InputError(
                 "no checkpoint lies beside the run file, and only checkpoints hold all buds",
                 where=self.where,
             )
-        first = self.scenario.start_year - 1
-        return self._restored(min(paths, key=lambda path: abs(first + step_of(path) - year)))
+        return min(found, key=lambda each: abs(each[0] - year))
 
     def _restore(self, path: Path) -> Stand:
         from forest.record.checkpoint import read_checkpoint

@@ -6,7 +6,8 @@ turning the view changes nothing but the camera.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,6 +56,7 @@ class Stage:
         self._conifers = frozenset(conifers)
         self.plotter = pv.Plotter(off_screen=True, window_size=_WINDOW, lighting="none")
         self.plotter.render_window.SetMultiSamples(0)
+        self.plotter.enable_anti_aliasing("fxaa")
         self.plotter.set_background(_SKY[0], top=_SKY[1])
         self.plotter.enable_terrain_style(mouse_wheel_zooms=True)
         self._bodies = Bodies(
@@ -82,7 +84,12 @@ class Stage:
     # ------------------------------------------------------------------ trees
 
     def show_trees(
-        self, trees: pd.DataFrame, colours: NDArray[np.float64], skeletons: list[Skeleton]
+        self,
+        trees: pd.DataFrame,
+        colours: NDArray[np.float64],
+        skeletons: Sequence[Skeleton] = (),
+        *,
+        alone: int | None = None,
     ) -> None:
         """Put the trees of a year in place of those before.
 
@@ -92,8 +99,10 @@ class Stage:
             As `tree_bodies` takes them, with `status`.
         colours : float64 (n, 3)
             Of each tree, 0 to 1.
-        skeletons : list of Skeleton
+        skeletons : sequence of Skeleton
             Trees that are shown with branches in place of a body.
+        alone : int, optional
+            The only tree that is shown.
         """
         sides = next(sides for most, sides in _DETAIL if len(trees) <= most)
         self._bodies = tree_bodies(
@@ -106,13 +115,17 @@ class Stage:
         self._ids = trees["tree_id"].to_numpy(np.int64)
         self._species = list(trees["species"].astype(str))
         self._top = float(np.nanmax(trees["height_m"].to_numpy(np.float64), initial=1.0))
-        self._skeletons = {skeleton.tree_id: skeleton for skeleton in skeletons}
-        if skeletons:
-            shown = ~np.isin(self._ids, list(self._skeletons))[self._bodies.tree]
-            kept = shown[self._bodies.triangles[:, 0]]
-            self._bodies = self._bodies._replace(triangles=self._bodies.triangles[kept])
         self._light = _baked_light(self._bodies)
-        self.put("branches", self._add_branches if skeletons else None)
+        self._skeletons = {
+            shape.tree_id: shape for shape in skeletons if alone in (None, shape.tree_id)
+        }
+        shown = ~np.isin(self._ids, list(self._skeletons))
+        if alone is not None:
+            shown &= self._ids == alone
+        if not shown.all():
+            kept = shown[self._bodies.tree[self._bodies.triangles[:, 0]]]
+            self._bodies = self._bodies._replace(triangles=self._bodies.triangles[kept])
+        self.put("branches", self._add_branches if self._skeletons else None)
         self._place_bodies()
         self.recolour(colours)
 
@@ -199,17 +212,14 @@ class Stage:
 
     def look_at_tree(self, tree_id: int) -> None:
         """Point the camera at one tree."""
-        points = self._bodies.points[
-            np.isin(self._bodies.tree, np.flatnonzero(self._ids == tree_id))
-        ]
+        row = np.flatnonzero(self._ids == tree_id)
+        points = self._bodies.points[np.isin(self._bodies.tree, row)].astype(np.float64)
         if tree_id in self._skeletons:
             points = self._skeletons[tree_id].end
         if len(points):
-            box = np.stack((points.min(axis=0), points.max(axis=0))).astype(np.float64)
-            self._look(
-                np.array([(x, y, z) for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]]),
-                *LOOKS["stand"],
-            )
+            low, high = points.min(axis=0), points.max(axis=0)
+            corners = np.array(list(product(*zip(low, high, strict=True))))
+            self._look(corners, *LOOKS["stand"])
 
     def _look(self, corners: NDArray[np.float64], bearing: float, above: float) -> None:
         width, height = self.plotter.window_size
@@ -297,4 +307,5 @@ def _baked_light(bodies: Bodies) -> NDArray[np.float64]:
         )
     length = np.linalg.norm(total, axis=1)
     facing = np.divide(total @ SUN, length, out=np.zeros(len(points)), where=length > 0.0)
-    return _AMBIENT + (1.06 - _AMBIENT) * np.maximum(0.5 + 0.5 * facing, 0.0)
+    light: NDArray[np.float64] = _AMBIENT + (1.06 - _AMBIENT) * (0.5 + 0.5 * facing)
+    return light
