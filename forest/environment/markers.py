@@ -132,6 +132,26 @@ class MarkerSpace:
         """Edges of a cell along x, y and z, m."""
         return self._cell.copy()
 
+    @property
+    def cells(self) -> NDArray[np.int64]:
+        """Cells along x and y of a periodic plot; 0 where there is no end."""
+        return self._cells.copy()
+
+    @property
+    def seed(self) -> np.uint64:
+        """Seed of the markers' places in their cells."""
+        return self._seed
+
+    @property
+    def envelopes(self) -> Envelopes:
+        """Regions outside which there are no procedural markers."""
+        return self._envelopes
+
+    @property
+    def cloud(self) -> NDArray[np.float64]:
+        """Explicit markers, float64 (n, 3), m."""
+        return self._points.copy()
+
     def claim(
         self,
         metamers: Metamers,
