@@ -110,7 +110,7 @@ def simulate(
         # The stand comes before the file: if it cannot be built, the file is left as it was.
         if checkpoint is None:
             stand = Stand(scenario, observer.say)
-            writer = _create(scenario, out, count, command, overwrite)
+            writer = writer_of(scenario, out, threads=count, command=command, overwrite=overwrite)
         else:
             arrays, meta = checkpoint
             stand = Stand.restore(scenario, arrays, meta)
@@ -178,9 +178,15 @@ def _checkpoint(stand: Stand, writer: RunWriter, out: Path) -> None:
     write_checkpoint(out, arrays, meta, step=stand.steps)
 
 
-def _create(
-    scenario: Scenario, out: Path, threads: int, command: Sequence[str], overwrite: bool
+def writer_of(
+    scenario: Scenario,
+    out: Path,
+    *,
+    threads: int,
+    command: Sequence[str] = (),
+    overwrite: bool = False,
 ) -> RunWriter:
+    """Make the run file of a scenario, without a year; see `RunWriter.create`."""
     n = len(scenario.planting_positions()[0])
     return RunWriter.create(
         out,
@@ -190,13 +196,18 @@ def _create(
         species_names=[s.name for s in scenario.species_list],
         threads=threads,
         residual=[(tree.name, tree.species) for tree in scenario.residual_trees],
-        tables=[
-            name for name in scenario.output.tables if name != "residual" or scenario.residual_trees
-        ],
+        tables=stored_tables(scenario),
         trees_per_year=max(n, 1),
         command=command,
         overwrite=overwrite,
     )
+
+
+def stored_tables(scenario: Scenario) -> list[str]:
+    """Name the tables that a run of a scenario stores, beside the ledger of the living."""
+    return [
+        name for name in scenario.output.tables if name != "residual" or scenario.residual_trees
+    ]
 
 
 def _is_complete(scenario: Scenario, out: Path) -> bool:

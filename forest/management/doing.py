@@ -16,7 +16,7 @@ from forest.management.treatments import stand_now
 from forest.measure.trees import TreeMeasures
 from forest.record.schema import CAUSES
 from forest.trees import table
-from forest.trees.pruning import cut_branches
+from forest.trees.pruning import cut_branches, still_there
 from forest.yearbook import Event, Loss
 
 if TYPE_CHECKING:
@@ -77,8 +77,7 @@ def cut(
     removed = 0
     for tree_id, serials in cuts.items():
         row = stand.row_of(tree_id)
-        start, size = int(stand.rows.start[row]), int(stand.rows.size[row])
-        left = serials[np.isin(serials, stand.arena.metamers.serial[start : start + size])]
+        left = still_there(stand.arena.metamers, stand.rows, row, serials)
         if not len(left):
             continue
         kappa = float(branch_pipe[stand.rows.species[row]])

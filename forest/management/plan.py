@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -63,6 +63,13 @@ class YearOfActs(NamedTuple):
     fellings: dict[int, Felling]
     plantings: dict[int, Places]
     triggers: list[int]
+
+    def touched(self) -> Iterator[tuple[str, Iterable[int]]]:
+        """Tell what is done to which trees that stand: kind of act, ids."""
+        for cuts in self.prunings.values():
+            yield "prune", cuts
+        for felling in self.fellings.values():
+            yield "fell", felling.tree_ids
 
 
 def plan_year(stand: Stand, year: int) -> YearOfActs | None:

@@ -364,6 +364,29 @@ class Scenario(Table):
             folder=self._folder,
         )
 
+    def lived(self, acts: Iterable[Mapping[str, Any]], *, years: int, planned: int) -> Scenario:
+        """Give the scenario of so many years with further acts, of which the last may be to come.
+
+        Parameters
+        ----------
+        acts : iterable of mapping
+            Entries of `acts`, behind those that there are.
+        years : int
+            Years to simulate.
+        planned : int
+            Years in which these acts may be due; those that this scenario plans stay planned.
+
+        Raises
+        ------
+        InputError
+            If an act is not right.
+        """
+        data = self.model_dump()
+        planned = max(planned, len(self.planned_calendar))
+        data.update(years=years, planned_years=planned if planned > years else None)
+        data["acts"] = (*data["acts"], *acts)
+        return self._build(data, where="", folder=self._folder)
+
     def to_toml(self) -> str:
         """Write the complete scenario, species and positions included, as TOML."""
         return to_toml(self.model_dump())

@@ -271,3 +271,14 @@ class Arena:
                 fields[k] = new
         self.metamers = Metamers(*metamers)
         self.companions = kind(*companions)
+
+    def alone(self, start: int, size: int) -> Arena:
+        """Give an arena that holds a copy of one extent, companions and all, at its start."""
+        copy = Arena.__new__(Arena)
+        here = slice(start, start + size)
+        metamers: list[Any] = [field[here].copy() for field in self.metamers]
+        companions: list[Any] = [field[here].copy() for field in self.companions]
+        copy.metamers = Metamers(*metamers)
+        copy.companions = type(self.companions)(*companions) if companions else ()
+        copy.used = size
+        return copy

@@ -115,6 +115,12 @@ def find_cuts(
     return place
 
 
+def still_there(arena: Metamers, trees: Trees, row: int, serials: ArrayLike) -> NDArray[np.int32]:
+    """Keep those of some serial numbers that a tree still has."""
+    wanted = np.asarray(serials, np.int32)
+    return wanted[np.isin(wanted, arena.serial[_extent(trees, row)])]
+
+
 def cut_branches(
     place: Arena, trees: Trees, row: int, serials: ArrayLike, branch_pipe: float
 ) -> NDArray[np.int32]:

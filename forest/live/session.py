@@ -1,0 +1,236 @@
+"""The live session: acts are queued, a step does them and grows a year, and all can be replayed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from forest.errors import ActError, InputError
+from forest.live.preview import preview
+from forest.live.records import tables_of, write_run
+from forest.live.saving import write_whole
+from forest.management.plan import YearOfActs, plan_year
+from forest.scenario.timing import Timing
+from forest.stand import Stand
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from forest.scenario import Scenario
+    from forest.trees.skeleton import Skeleton
+    from forest.yearbook import YearRecord
+
+
+class LiveSession:
+    """A stand that is worked on while it grows.
+
+    Acts are queued and done by the scenario's own machinery at the start of the next step. The
+    scenario that the session has come to is therefore a headless run of the same bits.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Where it starts; its own acts are done in their years.
+    save_to : path, optional
+        The session's scenario file, written anew, whole or not at all, after each act and step.
+    say : callable, optional
+        Told how the nursery goes on where the stand starts from an inventory.
+
+    Attributes
+    ----------
+    stand : Stand
+        As it is after the last step.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        save_to: str | Path | None = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._base = scenario
+        self._save_to = None if save_to is None else Path(save_to)
+        self._acts: list[dict[str, Any]] = []
+        self._pending: list[dict[str, Any]] = []
+        self._records: list[YearRecord] = []
+        self._tables: dict[str, pd.DataFrame] | None = None
+        self.stand = Stand(scenario, say)
+        self._become(self._with([]))
+
+    @property
+    def scenario(self) -> Scenario:
+        """The session as a scenario: all acts so far, and as many years as are done, one at least.
+
+        Run headless it gives the same bits. Acts that wait for the next step are in it as well.
+        """
+        return self.stand.scenario
+
+    @property
+    def year(self) -> int:
+        """The last complete calendar year; the one before the first before any step."""
+        return self.stand.year
+
+    @property
+    def next_year(self) -> int:
+        """The calendar year that the next step grows."""
+        return self.stand.year + 1
+
+    @property
+    def pending(self) -> tuple[dict[str, Any], ...]:
+        """The acts that wait for the next step, as they were given, in order."""
+        return tuple(dict(keys) for keys in self._pending)
+
+    @property
+    def records(self) -> tuple[YearRecord, ...]:
+        """The record of each year so far."""
+        return tuple(self._records)
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The tables of all years so far, by name, as their run file would give them."""
+        if self._tables is None:
+            self._tables = tables_of(self.scenario, self._records)
+        return dict(self._tables)
+
+    # ------------------------------------------------------------------ acts and years
+
+    def act(self, **keys: Any) -> None:
+        """Queue an act for the start of the next step.
+
+        Parameters
+        ----------
+        **keys
+            Those of an `[[acts]]` entry but for its time, as ``kind="fell", tree_ids=[3]``.
+
+        Raises
+        ------
+        InputError
+            If it is not right, or cannot be done to the stand as it is; then nothing is queued.
+        """
+        for key in Timing.model_fields.keys() - {"kind"}:
+            if key in keys:
+                raise InputError(
+                    f"{key} is given", where="act", expected="an act of the next year, without time"
+                )
+        queued = [*self._pending, keys]
+        before = self.stand.scenario
+        try:
+            self._become(self._with(queued))
+            plan_year(self.stand, self.next_year)
+        except InputError as error:
+            self._become(before)
+            number = len(self._base.acts) + len(self._acts) + len(self._pending)
+            raise InputError(str(error).replace(f"acts[{number}]", "act", 1)) from None
+        self._pending = queued
+        self._keep()
+
+    def undo(self) -> None:
+        """Take back the last act that waits for the next step.
+
+        Raises
+        ------
+        InputError
+            If none waits: what is done is done.
+        """
+        if not self._pending:
+            raise InputError(
+                "no act is pending", where="undo", expected="an act since the last step"
+            )
+        self._become(self._with(self._pending[:-1]))
+        self._pending = self._pending[:-1]
+        self._keep()
+
+    def step(self) -> YearRecord:
+        """Do the acts that wait, grow a year and give its record.
+
+        Raises
+        ------
+        InputError
+            If an act of the scenario that the session started from cannot be done in its year, or
+            the climate ends; then the stand is as it was.
+        """
+        done = self._dated(self._pending)
+        record = self.stand.step()
+        self._acts += done
+        self._pending = []
+        self._records.append(record)
+        self._tables = None
+        self._become(self._with([]))
+        self._keep()
+        return record
+
+    # ------------------------------------------------------------------ what it is now
+
+    def trees(self) -> pd.DataFrame:
+        """The living trees now, with what the next step will do to each in a column `pending`.
+
+        It is "" for nothing, or the kinds of the acts, joined by commas.
+        """
+        trees = self.stand.trees
+        waiting: dict[int, list[str]] = {}
+        plan = self._plan()
+        if plan is not None:
+            for kind, tree_ids in plan.touched():
+                for tree_id in tree_ids:
+                    kinds = waiting.setdefault(tree_id, [])
+                    if kind not in kinds:
+                        kinds.append(kind)
+        trees["pending"] = [",".join(waiting.get(i, ())) for i in trees.tree_id]
+        return trees
+
+    def skeleton(self, tree_id: int) -> Skeleton:
+        """The shape of a living tree as the acts that wait will leave it.
+
+        Raises
+        ------
+        InputError
+            If no living tree has that id.
+        """
+        return preview(self.stand, tree_id, self._plan())
+
+    # ------------------------------------------------------------------ files
+
+    def save(self, path: str | Path) -> None:
+        """Write the scenario that replays the session, whole or not at all."""
+        write_whole(Path(path), self.scenario.to_toml())
+
+    def write_run(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write a run file of the years so far: the tables of the headless run.
+
+        Raises
+        ------
+        InputError
+            If no year is done, or the file cannot be written.
+        """
+        if not self._records:
+            raise InputError("no year is done", where="write_run", expected="a step before it")
+        scenario = self._with([])
+        write_run(scenario, self._records, Path(path), overwrite=overwrite)
+
+    # ------------------------------------------------------------------ inside
+
+    def _plan(self) -> YearOfActs | None:
+        """What the next step will do; None if nothing, or if it cannot be done."""
+        try:
+            return plan_year(self.stand, self.next_year)
+        except ActError:
+            return None
+
+    def _dated(self, acts: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        return [{**keys, "year": self.next_year} for keys in acts]
+
+    def _with(self, pending: list[dict[str, Any]]) -> Scenario:
+        done = self.stand.steps
+        return self._base.lived(
+            [*self._acts, *self._dated(pending)], years=max(done, 1), planned=done + 1
+        )
+
+    def _become(self, scenario: Scenario) -> None:
+        """Let the stand have a scenario that differs in acts and years alone."""
+        self.stand.scenario = scenario
+
+    def _keep(self) -> None:
+        if self._save_to is not None:
+            self.save(self._save_to)
