@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import ActError, InputError
+from forest.management.brushing import Drawn, draw
 from forest.management.filling import pattern_places
 from forest.management.selection import Mask, census_of, to_harvest, to_prune, to_thin
 from forest.management.treatments import quantities
@@ -16,6 +17,7 @@ from forest.measure.tables import plot_of
 from forest.measure.trees import TreeMeasures
 from forest.scenario.acts import Act, Fell, Plant, Planted, Prune, Pruning
 from forest.scenario.cuttings import Thin
+from forest.scenario.strokes import Stroke
 from forest.trees.pruning import choose_branches, find_cuts
 from forest.trees.table import row_of
 
@@ -53,7 +55,7 @@ class YearOfActs(NamedTuple):
     ----------
     measures : TreeMeasures
         Of the stand before them.
-    prunings, fellings, plantings : dict by number of the act
+    prunings, fellings, plantings, strokes : dict by number of the act
     triggers : list of int
         Acts that a trigger fired.
     """
@@ -62,6 +64,7 @@ class YearOfActs(NamedTuple):
     prunings: dict[int, Cuts]
     fellings: dict[int, Felling]
     plantings: dict[int, Places]
+    strokes: dict[int, Drawn]
     triggers: list[int]
 
     def touched(self) -> Iterator[tuple[str, Iterable[int]]]:
@@ -75,7 +78,8 @@ class YearOfActs(NamedTuple):
 def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     """Find out what the acts of a year do to the stand as it is before that year.
 
-    First it is pruned, then felled, then planted, each kind in the order of the file. A thinning
+    First it is pruned, then felled, then planted, then strokes are laid, each kind in the order of
+    the file. A thinning
     or harvest sees what those before it leave; a pruning that chooses trees by rule, and a
     pattern of planting, see what all of them leave. Triggers see the stand before all acts.
     Nothing is changed here, so that a year is acted on wholly or not at all.
@@ -104,7 +108,7 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     due = _due(stand, asked, measures)
     if not due:
         return None
-    plan = YearOfActs(measures, {}, {}, {}, [i for i, act in due if act.when is not None])
+    plan = YearOfActs(measures, {}, {}, {}, {}, [i for i, act in due if act.when is not None])
     census = census_of(stand, measures)
     standing = np.ones(len(census.tree_id), np.bool_)
     first = stand.treatments.number + 1
@@ -113,7 +117,9 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
         try:
             if isinstance(act, Prune):
                 continue
-            if isinstance(act, Plant):
+            if isinstance(act, Stroke):
+                plan.strokes[i] = draw(act, stand, f"acts[{i}].{{}} in {year}")
+            elif isinstance(act, Plant):
                 plan.plantings[i] = _places(act, stand, census, standing, plan, numbers[i])
             else:
                 where = f"acts[{i}]"
@@ -153,7 +159,7 @@ def _asked(stand: Stand, year: int) -> list[tuple[int, Act]]:
 def _due(
     stand: Stand, asked: list[tuple[int, Act]], measures: TreeMeasures
 ) -> list[tuple[int, Act]]:
-    """List the acts that are done, in their order: prunings, fellings, plantings."""
+    """List the acts that are done, in their order: prunings, fellings, plantings, strokes."""
     found = None
     due = []
     for i, act in asked:
@@ -165,7 +171,7 @@ def _due(
             if not condition.holds(float(found[condition.quantity][kind])):
                 continue
         due.append((i, act))
-    order = {"prune": 0, "plant": 2}
+    order = {"prune": 0, "plant": 2, "stroke": 3}
     return sorted(due, key=lambda entry: order.get(entry[1].kind, 1))
 
 
@@ -189,7 +195,7 @@ def _felling(
     if isinstance(act, Thin):
         chosen = to_thin(act, census, stand, standing, number)
         return Felling("thin", census.tree_id[np.sort(chosen)].tolist(), act.cause)
-    assert not isinstance(act, Prune | Plant)
+    assert not isinstance(act, Prune | Plant | Stroke)
     chosen = to_harvest(act, census, stand, standing)
     return Felling("harvest", census.tree_id[chosen].tolist(), "harvest")
 

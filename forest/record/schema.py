@@ -56,7 +56,7 @@ DEATH_CAUSES = (
     "other",
 )
 FELLING_CAUSES = ("thinning", "harvest", "tending")
-ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest")
+ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest", "stroke")
 STAGES = ("before", "after")
 RESIDUAL_STATUS = ("standing", "felled")
 

@@ -13,6 +13,7 @@ from forest.scenario.cuttings import Harvest, Rule, Thin, check_rule
 from forest.scenario.model import PlantedTree, Plot
 from forest.scenario.placing import MOST_TREES, random_count
 from forest.scenario.regions import Region, check_region
+from forest.scenario.strokes import Stroke
 from forest.scenario.timing import Timing, check_timing
 from forest.species.schema import Refusal, Table, quantity, refusal
 
@@ -309,7 +310,7 @@ class Plant(Planted, Timing):
     kind: Literal["plant"] = quantity("plant", "kind of act", unit="")
 
 
-Act = Annotated[Prune | Fell | Plant | Thin | Harvest, Field(discriminator="kind")]
+Act = Annotated[Prune | Fell | Plant | Thin | Harvest | Stroke, Field(discriminator="kind")]
 
 
 def check_acts(
@@ -380,16 +381,23 @@ def _check_room(act: Planted, start: str, plot: Plot) -> None:
 
 
 def _check_felled_once(acts: Sequence[Act], years: range) -> None:
-    """Refuse to prune or fell a tree that is gone; in one year pruning comes before felling."""
+    """Refuse to do something to a tree that is gone.
+
+    In one year pruning comes before felling, and strokes after it.
+    """
+    order = {"prune": 0, "fell": 1, "stroke": 2}
     felled: dict[int, tuple[int, int]] = {}
     by_id = [
-        (year, act.kind == "fell", i, act)
+        (year, order[act.kind], i, act)
         for i, act in enumerate(acts)
-        if act.when is None and isinstance(act, Prune | Fell)
+        if act.when is None and isinstance(act, Prune | Fell | Stroke)
         for year in act.calendar_years(years)
     ]
     for year, _, i, act in sorted(by_id, key=lambda entry: entry[:3]):
-        ids, key = (act.ids, act.ids_key) if isinstance(act, Prune) else (act.tree_ids, "tree_ids")
+        if isinstance(act, Fell):
+            ids, key = act.tree_ids, "tree_ids"
+        else:
+            ids, key = act.ids, act.ids_key
         for tree_id in ids:
             if tree_id in felled:
                 by, then = felled[tree_id]

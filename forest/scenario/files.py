@@ -205,6 +205,22 @@ def read_cloud(file: str, context: Any) -> list[tuple[float, float, float]]:
     ]
 
 
+def read_stroke(
+    file: str, context: Any
+) -> tuple[list[tuple[float, float, float]], list[float] | None]:
+    """Read the points of a brush's path, and its radii where there is a column radius_m."""
+    points = []
+    radii = []
+    for line, row in _rows(file, context, ("x_m", "y_m", "z_m")):
+        x, y, z = (_number(file, line, row, column) for column in ("x_m", "y_m", "z_m"))
+        points.append((x, y, z))
+        if "radius_m" in row:
+            radii.append(_number(file, line, row, "radius_m", (0.0, _LIMIT_M)))
+    if not points:
+        raise Refusal(f"{file!r} holds no point", expected="at least one row")
+    return points, radii or None
+
+
 def find_mesh(file: str, context: Any) -> str:
     """Check that a mesh file exists and is of a known kind; give its absolute path."""
     path = locate(file, context)
