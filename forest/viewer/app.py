@@ -7,8 +7,9 @@ and opened again, or a second one, shows the same.
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from forest.errors import InputError
 from forest.viewer.colours import CHOICES, colour_trees
@@ -177,9 +178,19 @@ class App:
 
     def refresh(self) -> None:
         """Bring panels and picture up to date."""
+        self.refresh_panels()
+        self.push()
+
+    def refresh_panels(self) -> None:
+        """Bring the panels up to date."""
         for panel in self.panels:
             panel.refresh()
-        self.push()
+
+    def show_inside(self, add: Callable[[Any], None] | None) -> None:
+        """Put something among the trees, whose crowns then make way for it; None takes it away."""
+        self.stage.put("inside", add)
+        self.stage.crowns = add is None
+        self.show_year()
 
     def push(self) -> None:
         """Send the picture to the pages that are open."""
@@ -193,13 +204,21 @@ class App:
 
     # ------------------------------------------------------------------ what the page does
 
+    def _fault(self, *what: Any, **_: Any) -> None:
+        """Say that the viewer itself went wrong: trame keeps such faults to itself."""
+        said = " ".join(str(part) for part in what)
+        if "closing transport" not in said:  # a page was closed while a picture was on its way
+            print(f"forest view: fault: {said}", file=sys.stderr, flush=True)
+
     def _listen(self) -> None:
+        self.server.controller.on_exception.add(self._fault)
         state, trigger = self.state, self.server.controller.trigger
         state.change("step")(lambda **_: self._soon(self.show_year))
         state.change("branches")(lambda **_: self._soon(self.show_year))
         state.change("alone")(lambda **_: self._soon(self.show_year))
         state.change("colour_by")(lambda **_: self._soon(self.show_colours))
         state.change("playing")(lambda **_: self._play())
+        state.change("tab")(lambda **_: self._soon(self.refresh_panels))
         state.change("tool")(lambda **_: self._take_tool())
         trigger("pointer")(self._pointer)
         trigger("key")(self._key)

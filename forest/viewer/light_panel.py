@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from forest.stand import Stand
     from forest.viewer.app import App
 
+_COLOURS = "inferno"
+_RAMP = "linear-gradient(to right, #000004, #420a68, #932667, #dd513a, #fca50a, #fcffa4)"
 _WAYS = (
     ("slice", "Light at a height", "mdi-layers-outline"),
     ("markers", "Free markers", "mdi-dots-hexagon"),
@@ -44,6 +46,7 @@ class LightPanel:
                 "light_image": "",
                 "light_busy": False,
                 "light_shown": "",
+                "light_top": "",
             }
         )
         trigger = app.server.controller.trigger
@@ -92,6 +95,11 @@ class LightPanel:
             )
             v.VProgressLinear(indeterminate=True, v_if=("light_busy",), color="primary")
             html.Div("{{ light_said }}", classes="quiet mt-2", id="light-said")
+            with html.Div(v_if=("light_top",)):
+                html.Div(classes="ramp", style=f"background: {_RAMP}")
+                with html.Div(classes="ends quiet"):
+                    html.Span("0")
+                    html.Span("{{ light_top }}")
             html.Img(
                 v_if=("light_image",),
                 src=("light_image",),
@@ -119,7 +127,7 @@ class LightPanel:
             "markers": self._markers,
             "sun": self._sun,
         }[way]
-        app.state.light_busy, app.state.light_image = True, ""
+        app.state.update({"light_busy": True, "light_image": "", "light_top": ""})
         app.state.light_said = "reckoning (the first time on a machine takes a minute)"
         app.state.flush()
         try:
@@ -129,7 +137,6 @@ class LightPanel:
         except InputError as error:
             app.state.light_said = str(error)
         app.state.light_busy = False
-        app.push()
 
     def _stand(self) -> Stand:
         stand = self._app.source.stand_near(self._app.year)
@@ -139,18 +146,18 @@ class LightPanel:
 
     def _clear(self) -> None:
         state = self._app.state
-        self._app.stage.put("inside", None)
-        state.light_said, state.light_image, state.light_shown = "", "", ""
-        self._app.push()
+        state.light_said, state.light_image, state.light_shown, state.light_top = "", "", "", ""
+        self._app.show_inside(None)
 
     def _slice(self, stand: Stand) -> str:
         height = float(self._app.state.light_height)
         cut = light_slice(stand, height)
-        self._app.stage.put("inside", lambda plotter: _add_slice(plotter, cut))
+        self._app.show_inside(lambda plotter: _add_slice(plotter, cut))
         light = cut.light
+        self._app.state.light_top = f"{_top(cut):.2f}"
         return (
             f"Relative light {cut.height_m:g} m above the ground, mean of sun and sky: "
-            f"{light.min():.2f} to {light.max():.2f}, mean {light.mean():.2f}. Bright is light."
+            f"{light.min():.2f} to {light.max():.2f}, mean {light.mean():.2f}."
         )
 
     def _markers(self, stand: Stand) -> str:
@@ -158,7 +165,7 @@ class LightPanel:
         if chosen is not None and chosen not in stand.rows.tree_id:
             chosen = None
         points, step = markers_around(stand, chosen)
-        self._app.stage.put("inside", lambda plotter: _add_markers(plotter, points))
+        self._app.show_inside(lambda plotter: _add_markers(plotter, points))
         where = "the plot" if chosen is None else f"tree {chosen}"
         share = "" if step == 1 else f", one row of {step} drawn"
         return f"{len(points)} free markers around {where}{share}."
@@ -181,6 +188,11 @@ class LightPanel:
         )
 
 
+def _top(cut: Slice) -> float:
+    """Give the light of the scale's upper end: deep shade would be all black on 0 to 1."""
+    return max(float(cut.light.max()), 0.02)
+
+
 def _add_slice(plotter: Any, cut: Slice) -> None:
     pv = import_pyvista()
     ny, nx = cut.light.shape
@@ -193,11 +205,10 @@ def _add_slice(plotter: Any, cut: Slice) -> None:
     plotter.add_mesh(
         grid,
         scalars="light",
-        cmap="inferno",
-        clim=(0.0, 1.0),
+        cmap=_COLOURS,
+        clim=(0.0, _top(cut)),
         lighting=False,
         show_scalar_bar=False,
-        opacity=0.9,
         reset_camera=False,
         render=False,
     )

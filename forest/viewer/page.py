@@ -62,7 +62,7 @@ def _pointer(kind: str) -> str:
 
 
 _KEYS = (
-    "if (!['INPUT', 'TEXTAREA'].includes($event.target.tagName) "
+    "if (!$event.target.closest('input, textarea, [role=slider], [role=listbox]') "
     "&& ['ArrowLeft', 'ArrowRight', 'Home', 'End', ' ', 'Escape'].includes($event.key)) "
     "{ $event.preventDefault(); trigger('key', [$event.key]); }"
 )

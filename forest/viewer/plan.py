@@ -24,7 +24,6 @@ class PlanPanel:
     def __init__(self, app: App) -> None:
         self._app = app
         app.state.plan_html = ""
-        app.state.change("tab")(lambda **_: self.refresh())
         app.server.controller.trigger("plan_click")(self._click)
 
     def build(self) -> None:

@@ -48,7 +48,14 @@ class Stage:
         Size of the plot, m.
     conifers : collection of str
         Species that are drawn as cones.
+
+    Attributes
+    ----------
+    crowns : bool
+        Whether crowns are shown.
     """
+
+    crowns = True
 
     def __init__(self, size_m: tuple[float, float], conifers: Collection[str]) -> None:
         pv = import_pyvista()
@@ -56,7 +63,6 @@ class Stage:
         self._conifers = frozenset(conifers)
         self.plotter = pv.Plotter(off_screen=True, window_size=_WINDOW, lighting="none")
         self.plotter.render_window.SetMultiSamples(0)
-        self.plotter.enable_anti_aliasing("fxaa")
         self.plotter.set_background(_SKY[0], top=_SKY[1])
         self.plotter.enable_terrain_style(mouse_wheel_zooms=True)
         self._bodies = Bodies(
@@ -122,8 +128,10 @@ class Stage:
         shown = ~np.isin(self._ids, list(self._skeletons))
         if alone is not None:
             shown &= self._ids == alone
-        if not shown.all():
-            kept = shown[self._bodies.tree[self._bodies.triangles[:, 0]]]
+        if not (shown.all() and self.crowns):
+            corner = self._bodies.triangles[:, 0]
+            kept = shown[self._bodies.tree[corner]]
+            kept &= self.crowns | ~self._bodies.crown[corner]
             self._bodies = self._bodies._replace(triangles=self._bodies.triangles[kept])
         self.put("branches", self._add_branches if self._skeletons else None)
         self._place_bodies()
