@@ -219,6 +219,11 @@ class Regeneration:
         if len(places.cohort):
             establish(stand, _newcomers(ready, places), "recruited", traits)
 
+    def move_under(self, canopy: Canopy) -> None:
+        """Let the seedlings live under another canopy, as when an obstacle is put up."""
+        self._canopy = canopy
+        self._shade()
+
     def _shade(self) -> None:
         """Let the seedlings shade the lowest layer of next year's canopy."""
         lai = seedlings.leaf_index(

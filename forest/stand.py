@@ -93,6 +93,10 @@ class Stand(management.Hand):
         The strokes of the procedural brush.
     treatments : Treatments
         What acts changed since the last record.
+    marks : Marks
+        The words with which trees are marked.
+    obstacles : Obstacles
+        The obstacles that stand now.
     dead_wood : DeadWood or None
         Snags and lying dead wood, where the scenario has snags.
     residual : ResidualTrees
@@ -133,10 +137,14 @@ class Stand(management.Hand):
         self.climate = Climate(scenario)
         self.surroundings = Surroundings(scenario, self.pipe_exponent)
         self.treatments = management.Treatments(self)
+        self.marks = management.Marks()
+        self.obstacles = management.Obstacles(self)
         self.storms = Storms(scenario, self.pipe_exponent)
         self.brush = management.Brush()
         self.memories: dict[str, Memory] = {
+            "obstacles": self.obstacles,
             "surroundings": self.surroundings,
+            "marks": self.marks,
             "treatments": self.treatments,
             "storms": self.storms,
             "brush": self.brush,

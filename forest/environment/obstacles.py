@@ -42,9 +42,12 @@ class Mesh:
     ----------
     file : Path
         STL, OBJ, PLY or VTP file.
+    at_m : (float, float, float)
+        Where the file's origin stands, m.
     """
 
     file: Path
+    at_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Solid(NamedTuple):
@@ -102,6 +105,37 @@ def inside(solid: Any, trees: Any, row: Any, place: Any, voxel_m: Any) -> Any:
         trees.base_voxel[row, 1] + np.int32(np.floor(y / voxel_m)),
         trees.base_voxel[row, 2] + np.int32(np.floor(z / voxel_m)),
     )
+
+
+def solid_places(
+    solid: Solid, base_voxel: NDArray[Any], places: NDArray[np.float64], voxel_m: float
+) -> NDArray[np.bool_]:
+    """Tell which places lie inside an obstacle.
+
+    Parameters
+    ----------
+    solid : Solid
+    base_voxel : int (3,)
+        Voxel in whose corner the places have their origin.
+    places : float64 (n, 3)
+        Relative to that corner, m.
+    voxel_m : float
+
+    Returns
+    -------
+    bool (n,)
+    """
+    if solid.mask.size == 1:
+        return np.zeros(len(places), np.bool_)
+    voxel = np.asarray(base_voxel, np.int64) + np.floor(places / voxel_m).astype(np.int64)
+    at = voxel - solid.origin
+    if solid.periodic:
+        at[:, :2] %= solid.shape
+    here = ((at >= 0) & (at < solid.mask.shape[::-1])).all(axis=1)
+    found = np.zeros(len(places), np.bool_)
+    x, y, z = at[here].T
+    found[here] = solid.mask[z, y, x] != 0
+    return found
 
 
 def no_solid() -> Solid:
@@ -200,7 +234,7 @@ def _closed_surface(mesh: Mesh) -> Any:
         raise InputError(
             "the mesh is not closed", where=str(mesh.file), expected="a watertight surface"
         )
-    return surface
+    return surface.translate(mesh.at_m) if any(mesh.at_m) else surface
 
 
 def _bounding_axes(surface: Any, voxel_m: float) -> list[NDArray[np.int64]]:

@@ -8,7 +8,8 @@ light, unless markers give one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,7 @@ from forest.trees.table import Trees
 
 if TYPE_CHECKING:
     from forest.scenario import Scenario
+    from forest.scenario.model import Obstacle
 
 
 class Surroundings:
@@ -69,7 +71,8 @@ class Surroundings:
         else:
             self.voxel_m = min(size_m) / max(1, round(min(size_m) / float(internode.min())))
         self.full_light = spec.shadow.full_light if spec.shadow else 1.0
-        self._light = Light(
+        self._make_light = partial(
+            Light,
             ShadowSpec(**spec.shadow.model_dump()) if spec.shadow else None,
             CanopySpec(**spec.canopy.model_dump()) if spec.canopy else None,
             size_m=size_m,
@@ -82,24 +85,21 @@ class Surroundings:
                 perception_distance_m=reach,
             ),
             latitude_deg=scenario.site.latitude_deg,
-            obstacles=[
-                Box(o.min_m, o.max_m) if o.kind == "box" else Mesh(Path(o.file))
-                for o in scenario.obstacles
-            ],
         )
-        self._rendered: RenderedLight | None = None
+        self._make_rendered: Callable[..., RenderedLight] | None = None
         if spec.rendered is not None:
-            self._rendered = RenderedLight(
+            self._make_rendered = partial(
+                RenderedLight,
                 RenderedSpec(**spec.rendered.model_dump()),
                 size_m=size_m,
                 periodic=periodic,
                 latitude_deg=scenario.site.latitude_deg,
                 seed=scenario.seed,
                 looks=Looks(np.array([s.leaves.area_m2 for s in species]), pipe_exponent),
-                solid=self._light.solid,
                 voxel_m=self.voxel_m,
                 full_light=self.full_light,
             )
+        self.build(scenario.obstacles)
         self._markers: MarkerSpace | None = None
         if spec.markers is not None:
             self._markers = MarkerSpace(
@@ -119,6 +119,24 @@ class Surroundings:
                 np.cos(0.5 * np.radians(angle)).astype(np.float32),
             )
         self._space: tuple[NDArray[np.int64], NDArray[np.float32]] | None = None
+
+    def build(self, obstacles: Sequence[Obstacle]) -> None:
+        """Let these obstacles stand, in place of all that stood.
+
+        Raises
+        ------
+        InputError
+            If a mesh cannot be used, or obstacles are too large or too far away.
+        """
+        self._light = self._make_light(obstacles=shapes_of(obstacles))
+        self._rendered: RenderedLight | None = None
+        if self._make_rendered is not None:
+            self._rendered = self._make_rendered(solid=self._light.solid)
+
+    def solid_of(self, obstacles: Sequence[Obstacle]) -> Solid:
+        """Give the voxels that other obstacles would fill; raises as `build` does."""
+        light: Light = self._make_light(obstacles=shapes_of(obstacles))
+        return light.solid
 
     @property
     def solid(self) -> Solid:
@@ -206,6 +224,13 @@ class Surroundings:
             self._markers.restore(
                 {k[len(start) :]: v for k, v in arrays.items() if k.startswith(start)}
             )
+
+
+def shapes_of(obstacles: Sequence[Obstacle]) -> list[Box | Mesh]:
+    """Give a scenario's obstacles as light and growth know them."""
+    return [
+        Box(o.min_m, o.max_m) if o.kind == "box" else Mesh(Path(o.file), o.at_m) for o in obstacles
+    ]
 
 
 def _key(

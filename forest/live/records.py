@@ -49,7 +49,7 @@ def tables_of(scenario: Scenario, records: Sequence[YearRecord]) -> dict[str, pd
 
 def _with_population(records: Sequence[YearRecord]) -> list[dict[str, Mapping[str, Any]]]:
     living = 0
-    years = []
+    years: list[dict[str, Mapping[str, Any]]] = []
     for record in records:
         tables = record.tables
         row = ledger.population_row(record.year, living, tables["trees"], tables["events"])

@@ -56,6 +56,8 @@ class LiveSession:
         self._pending: list[dict[str, Any]] = []
         self._records: list[YearRecord] = []
         self._tables: dict[str, pd.DataFrame] | None = None
+        self._plan_now: YearOfActs | None = None
+        self._planned = False
         self.stand = Stand(scenario, say)
         self._become(self._with([]))
 
@@ -213,10 +215,13 @@ class LiveSession:
 
     def _plan(self) -> YearOfActs | None:
         """What the next step will do; None if nothing, or if it cannot be done."""
-        try:
-            return plan_year(self.stand, self.next_year)
-        except ActError:
-            return None
+        if not self._planned:
+            try:
+                self._plan_now = plan_year(self.stand, self.next_year)
+            except ActError:
+                self._plan_now = None
+            self._planned = True
+        return self._plan_now
 
     def _dated(self, acts: list[dict[str, Any]]) -> list[dict[str, Any]]:
         return [{**keys, "year": self.next_year} for keys in acts]
@@ -230,6 +235,7 @@ class LiveSession:
     def _become(self, scenario: Scenario) -> None:
         """Let the stand have a scenario that differs in acts and years alone."""
         self.stand.scenario = scenario
+        self._planned = False
 
     def _keep(self) -> None:
         if self._save_to is not None:

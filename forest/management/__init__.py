@@ -3,6 +3,7 @@
 from forest.management.brushing import Brush
 from forest.management.doing import act, check_due
 from forest.management.hand import Hand
+from forest.management.shaping import Marks, Obstacles
 from forest.management.treatments import Treatments
 
-__all__ = ["Brush", "Hand", "Treatments", "act", "check_due"]
+__all__ = ["Brush", "Hand", "Marks", "Obstacles", "Treatments", "act", "check_due"]

@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from forest import establishment
 from forest.dynamics.snags import is_left
 from forest.errors import InputError, nearest
+from forest.management import shaping
 from forest.management.brushing import Drawn
-from forest.management.plan import Felling, Places, plan_year
+from forest.management.plan import Felling, Marked, Places, plan_year
+from forest.management.shaping import Change
 from forest.management.treatments import stand_now
 from forest.measure.trees import TreeMeasures
 from forest.record.schema import CAUSES
+from forest.scenario.shaping import Bending
 from forest.trees import table
 from forest.trees.pruning import cut_branches, still_there
 from forest.yearbook import Event, Loss
@@ -37,9 +40,15 @@ def act(stand: Stand, traits: SpeciesTraits) -> None:
         return
     for number in plan.triggers:
         stand.treatments.fire(number, stand.year + 1)
-    measures = plan.measures
+    measures, kappa = plan.measures, traits.of["branch_pipe"]
+    for number, marked in plan.markings.items():
+        mark(stand, number, marked, measures)
+    for number, change in plan.changes.items():
+        measures = change_obstacle(stand, number, change, kappa, measures)
     for number, cuts in plan.prunings.items():
-        measures, _ = cut(stand, number, cuts, traits.of["branch_pipe"], measures)
+        measures, _ = cut(stand, number, cuts, kappa, measures)
+    for number, bending in plan.bendings.items():
+        measures, _ = bend(stand, number, bending, measures)
     for number, felling in plan.fellings.items():
         measures = fell(stand, number, felling, measures)
     for number, places in plan.plantings.items():
@@ -54,6 +63,7 @@ def cut(
     cuts: Mapping[int, NDArray[Any]],
     branch_pipe: NDArray[Any],
     measures: TreeMeasures,
+    kind: str = "prune",
 ) -> tuple[TreeMeasures, int]:
     """Cut trees at metamers that are there, or were until an act of the same year.
 
@@ -68,6 +78,8 @@ def cut(
         Thickness of a pipe along branches relative to the stem.
     measures : TreeMeasures
         Of the stand as it is.
+    kind : str
+        Of the act.
 
     Returns
     -------
@@ -91,8 +103,45 @@ def cut(
     if removed:
         measures = stand.measure()
         after = stand_now(stand, measures)
-    stand.treatments.note(act, "prune", before, after)
+    stand.treatments.note(act, kind, before, after)
     return measures, removed
+
+
+def mark(stand: Stand, act: int, marked: Marked, measures: TreeMeasures) -> None:
+    """Mark trees that live, with an event each; see `cut` for parameters."""
+    stand.marks.put(marked.word, marked.tree_ids)
+    for tree_id in marked.tree_ids:
+        stand.pending.append(Event.of(stand, stand.row_of(tree_id), "marked", "none", measures))
+    here = stand_now(stand, measures)
+    stand.treatments.note(act, "mark", here, here)
+
+
+def change_obstacle(
+    stand: Stand, act: int, change: Change, branch_pipe: NDArray[Any], measures: TreeMeasures
+) -> TreeMeasures:
+    """Let obstacles come, move or go, and cut off what is in their way; see `cut`."""
+    stand.obstacles.become(change.obstacles)
+    return cut(stand, act, change.cuts, branch_pipe, measures, "obstacle")[0]
+
+
+def bend(
+    stand: Stand, act: int, bending: Bending, measures: TreeMeasures, where: str = "acts[].{}"
+) -> tuple[TreeMeasures, float]:
+    """Bend an axis of a tree, if the metamer was not cut in the same year.
+
+    See `cut` for parameters; gives the distance from the target that is left, m, as well.
+    """
+    row = stand.row_of(bending.tree_id)
+    before = after = stand_now(stand, measures)
+    left = float("nan")
+    if len(still_there(stand.arena.metamers, stand.rows, row, [bending.metamer])):
+        solid = stand.surroundings.solid
+        left = shaping.bend(stand, stand.arena, stand.rows, row, bending, solid, where)
+        stand.pending.append(Event.of(stand, row, "bent", "none", measures))
+        measures = stand.measure()
+        after = stand_now(stand, measures)
+    stand.treatments.note(act, "bend", before, after)
+    return measures, left
 
 
 def fell(stand: Stand, act: int, felling: Felling, measures: TreeMeasures) -> TreeMeasures:

@@ -12,12 +12,22 @@ from forest.dynamics.storms import BROKEN, STOOD
 from forest.errors import InputError
 from forest.management import doing
 from forest.management.brushing import draw
-from forest.management.plan import Felling, Places, cuts_of, fill
+from forest.management.plan import (
+    Felling,
+    Marked,
+    Places,
+    change_of,
+    chosen_rows,
+    cuts_of,
+    fill,
+)
 from forest.management.selection import census_of, to_harvest, to_thin
+from forest.management.shaping import shape_to_come
 from forest.management.treatments import BY_HAND
 from forest.scenario.acts import Branches, Planted, Pruning, check_planted
 from forest.scenario.cuttings import Harvesting, Thinning, check_rule
 from forest.scenario.model import Regular
+from forest.scenario.shaping import Bending, Marking, ObstacleChange
 from forest.scenario.strokes import Stroking, check_stroke
 from forest.species.schema import Refusal
 from forest.species.text import input_error
@@ -294,6 +304,99 @@ class Hand:
             standing = np.ones(len(census.tree_id), np.bool_)
             cuts = cuts_of(rule, stand, census, standing, where)
         return doing.cut(stand, BY_HAND, cuts, self._traits.of["branch_pipe"], measures)[1]
+
+    def mark(self, tree_ids: Sequence[int] | None = None, *, mark: str, **rule: Any) -> list[int]:
+        """Mark trees with a word, by which acts can name them.
+
+        Parameters
+        ----------
+        tree_ids : sequence of int, optional
+            Living trees; in place of them `thickest_ha`, `all_trees` or `marked` in `rule`.
+        mark : str
+            A short word.
+        **rule
+            See `forest.scenario.shaping.Marking`.
+
+        Returns
+        -------
+        list of int
+            The ids of the marked trees.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree, or the rule is not right; then none is marked.
+        """
+        stand, where = cast("Stand", self), "Stand.mark"
+        ids = {} if tree_ids is None else {"tree_ids": tuple(doing.whole_ids(tree_ids, where))}
+        checked = Marking.of(where, mark=mark, **ids, **rule)
+        with _one_line(where):
+            check_rule(checked, "", stand.scenario.plot, stand.species_names, rows_m=True)
+        measures = stand.measure()
+        census = census_of(stand, measures)
+        standing = np.ones(len(census.tree_id), np.bool_)
+        rows = chosen_rows(checked, stand, census, standing, where)
+        marked = Marked(mark, census.tree_id[rows].tolist())
+        doing.mark(stand, BY_HAND, marked, measures)
+        return marked.tree_ids
+
+    def bend(self, tree_id: int, metamer: int, to_m: Sequence[float]) -> float:
+        """Bend an axis until a metamer's upper end is as near to a place as it can come.
+
+        See `forest.mechanics.arranging.bend_axis`; the branch keeps the shape.
+
+        Parameters
+        ----------
+        tree_id : int
+            A living tree.
+        metamer : int
+            Serial number of the metamer.
+        to_m : (float, float, float)
+            The place, m, in the plot's coordinates.
+
+        Returns
+        -------
+        float
+            Distance from it that is left, m.
+
+        Raises
+        ------
+        InputError
+            If there is no such tree or metamer, or something would come to lie below the ground or
+            in an obstacle; then nothing moves.
+        """
+        stand, where = cast("Stand", self), "Stand.bend"
+        act = Bending.of(where, tree_id=tree_id, metamer=metamer, to_m=to_m)
+        row_of(stand.rows, act.tree_id, where=where)
+        shape_to_come(stand, act.tree_id, [], [(act, where)], stand.surroundings.solid)
+        return doing.bend(stand, BY_HAND, act, stand.measure(), where)[1]
+
+    def obstacle(self, **change: Any) -> int:
+        """Put up an obstacle, move it or take it away; it counts from the next step on.
+
+        Parameters
+        ----------
+        **change
+            As in a scenario's acts: `add`, a table of `obstacles` with a name; `move` with `by_m`;
+            or `remove`. See `forest.scenario.shaping.ObstacleChange`.
+
+        Returns
+        -------
+        int
+            Trees of which something was cut off.
+
+        Raises
+        ------
+        InputError
+            If there is no such obstacle, or a tree stands where it comes; then nothing is done.
+        """
+        stand, where = cast("Stand", self), "Stand.obstacle"
+        act = ObstacleChange.of(where, **change)
+        standing = np.ones(len(stand.rows.tree_id), np.bool_)
+        found = change_of(act, stand, stand.obstacles.now, standing, where)
+        kappa = self._traits.of["branch_pipe"]
+        doing.change_obstacle(stand, BY_HAND, found, kappa, stand.measure())
+        return len(found.cuts)
 
     def stroke(self, points_m: Any = (), radius_m: Any = 0.5, **stroke: Any) -> int:
         """Lay markers along the path of a brush (Palubicki et al. 2009, section 5).

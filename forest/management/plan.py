@@ -12,23 +12,33 @@ from forest.errors import ActError, InputError
 from forest.management.brushing import Drawn, draw
 from forest.management.filling import pattern_places
 from forest.management.selection import Mask, census_of, to_harvest, to_prune, to_thin
+from forest.management.shaping import Change, Cuts, cuts_inside, shape_to_come
 from forest.management.treatments import quantities
 from forest.measure.tables import plot_of
 from forest.measure.trees import TreeMeasures
 from forest.scenario.acts import Act, Fell, Plant, Planted, Prune, Pruning
-from forest.scenario.cuttings import Thin
+from forest.scenario.choosing import ChosenTrees
+from forest.scenario.cuttings import Harvest, Thin
+from forest.scenario.shaping import Bend, Bending, ChangeObstacle, Mark, ObstacleChange
 from forest.scenario.strokes import Stroke
+from forest.species.schema import Refusal
+from forest.species.text import input_error
 from forest.trees.pruning import choose_branches, find_cuts
-from forest.trees.table import row_of
+from forest.trees.table import Trees, row_of
 
 if TYPE_CHECKING:
+    from forest.environment.obstacles import Solid
     from forest.management.thinning import Census
+    from forest.scenario.model import Obstacle
     from forest.stand import Stand
+    from forest.trees.metamers import Arena
 
 #: Plantings of a year draw from times that are so far apart, above any number of steps.
 _TIMES = 1 << 14
 
-Cuts = dict[int, NDArray[np.int32]]
+#: In which order the kinds of acts are done in a year; those that fell are not named.
+_ORDER = {"mark": 0, "obstacle": 1, "prune": 2, "bend": 3, "plant": 5, "stroke": 6}
+_FELLING = 4
 
 
 class Places(NamedTuple):
@@ -48,6 +58,13 @@ class Felling(NamedTuple):
     residual: tuple[str, ...] = ()
 
 
+class Marked(NamedTuple):
+    """Trees that are marked, and with what word."""
+
+    word: str
+    tree_ids: list[int]
+
+
 class YearOfActs(NamedTuple):
     """The acts of a year in the order in which they are done, by their numbers in the scenario.
 
@@ -55,13 +72,16 @@ class YearOfActs(NamedTuple):
     ----------
     measures : TreeMeasures
         Of the stand before them.
-    prunings, fellings, plantings, strokes : dict by number of the act
+    markings, changes, prunings, bendings, fellings, plantings, strokes : dict by number of the act
     triggers : list of int
         Acts that a trigger fired.
     """
 
     measures: TreeMeasures
+    markings: dict[int, Marked]
+    changes: dict[int, Change]
     prunings: dict[int, Cuts]
+    bendings: dict[int, Bending]
     fellings: dict[int, Felling]
     plantings: dict[int, Places]
     strokes: dict[int, Drawn]
@@ -69,17 +89,35 @@ class YearOfActs(NamedTuple):
 
     def touched(self) -> Iterator[tuple[str, Iterable[int]]]:
         """Tell what is done to which trees that stand: kind of act, ids."""
-        for cuts in self.prunings.values():
+        for marked in self.markings.values():
+            yield "mark", marked.tree_ids
+        for cuts in (*(change.cuts for change in self.changes.values()), *self.prunings.values()):
             yield "prune", cuts
+        for bending in self.bendings.values():
+            yield "bend", (bending.tree_id,)
         for felling in self.fellings.values():
             yield "fell", felling.tree_ids
+
+    def shape_of(self, stand: Stand, tree_id: int) -> tuple[Arena, Trees]:
+        """Give a copy of a tree as the acts of the year will leave it, but for its felling."""
+        bendings = [
+            (b, f"acts[{i}].{{}}") for i, b in self.bendings.items() if b.tree_id == tree_id
+        ]
+        cuts = [*(change.cuts for change in self.changes.values()), *self.prunings.values()]
+        return shape_to_come(stand, tree_id, cuts, bendings, self._solid(stand))
+
+    def _solid(self, stand: Stand) -> Solid:
+        if not self.changes:
+            return stand.surroundings.solid
+        return stand.surroundings.solid_of(list(self.changes.values())[-1].obstacles)
 
 
 def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     """Find out what the acts of a year do to the stand as it is before that year.
 
-    First it is pruned, then felled, then planted, then strokes are laid, each kind in the order of
-    the file. A thinning
+    First trees are marked, then obstacles change, it is pruned, bent, felled and planted, then
+    strokes are laid, each kind in the order of the file. Marks are given to the stand as it is
+    before. A thinning
     or harvest sees what those before it leave; a pruning that chooses trees by rule, and a
     pattern of planting, see what all of them leave. Triggers see the stand before all acts.
     Nothing is changed here, so that a year is acted on wholly or not at all.
@@ -108,35 +146,79 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     due = _due(stand, asked, measures)
     if not due:
         return None
-    plan = YearOfActs(measures, {}, {}, {}, {}, [i for i, act in due if act.when is not None])
+    triggers = [i for i, act in due if act.when is not None]
+    plan = YearOfActs(measures, {}, {}, {}, {}, {}, {}, {}, triggers)
     census = census_of(stand, measures)
     standing = np.ones(len(census.tree_id), np.bool_)
     first = stand.treatments.number + 1
     numbers = {i: first + k for k, (i, _) in enumerate(due)}
     for i, act in due:
         try:
-            if isinstance(act, Prune):
+            if isinstance(act, Prune | Bend | ChangeObstacle):
                 continue
             if isinstance(act, Stroke):
                 plan.strokes[i] = draw(act, stand, f"acts[{i}].{{}} in {year}")
+            elif isinstance(act, Mark):
+                rows = chosen_rows(act, stand, census, standing, f"acts[{i}].{{}} in {year}", plan)
+                plan.markings[i] = Marked(act.mark, census.tree_id[rows].tolist())
             elif isinstance(act, Plant):
                 plan.plantings[i] = _places(act, stand, census, standing, plan, numbers[i])
             else:
                 where = f"acts[{i}]"
                 gone = [name for done in plan.fellings.values() for name in done.residual]
-                felling = _felling(act, stand, census, standing, gone, numbers[i], where)
+                felling = _felling(act, stand, census, standing, gone, numbers[i], where, plan)
                 plan.fellings[i] = felling
                 standing &= ~np.isin(census.tree_id, felling.tree_ids)
         except InputError as refusal:
             raise ActError(str(refusal)) from None
-    for i, act in due:
-        if isinstance(act, Prune):
-            try:
-                where = f"acts[{i}].{{}} in {year}"
-                plan.prunings[i] = cuts_of(act, stand, census, standing, where)
-            except InputError as refusal:
-                raise ActError(str(refusal)) from None
+    try:
+        _plan_shapes(stand, year, due, plan, census, standing)
+    except InputError as refusal:
+        raise ActError(str(refusal)) from None
     return plan
+
+
+def _plan_shapes(
+    stand: Stand,
+    year: int,
+    due: list[tuple[int, Act]],
+    plan: YearOfActs,
+    census: Census,
+    standing: Mask,
+) -> None:
+    """Find out what changes the shape of trees: obstacles, prunings, bendings."""
+    obstacles = stand.obstacles.now
+    for i, act in due:
+        where = f"acts[{i}].{{}} in {year}"
+        if isinstance(act, ChangeObstacle):
+            plan.changes[i] = change_of(act, stand, obstacles, standing, where)
+            obstacles = plan.changes[i].obstacles
+        elif isinstance(act, Prune):
+            plan.prunings[i] = cuts_of(act, stand, census, standing, where, plan)
+        elif isinstance(act, Bend):
+            row_of(stand.rows, act.tree_id, where=where.format("tree_id"))
+            plan.bendings[i] = act
+            plan.shape_of(stand, act.tree_id)
+
+
+def change_of(
+    act: ObstacleChange,
+    stand: Stand,
+    obstacles: Sequence[Obstacle],
+    standing: Mask,
+    where: str,
+) -> Change:
+    """Find out what a change of obstacles comes to; `where` names a key of it in messages."""
+    key = "add" if act.add is not None else "move" if act.move is not None else "remove"
+    try:
+        after = act.applied(obstacles)
+    except Refusal as refused:
+        place = where.format(refused.key)
+        raise input_error(refused.what, where=place, expected=refused.expected) from None
+    if act.remove is not None:
+        return Change(after, {})
+    solid = stand.surroundings.solid_of(after)
+    return Change(after, cuts_inside(stand, solid, standing, where=where.format(key)))
 
 
 def _asked(stand: Stand, year: int) -> list[tuple[int, Act]]:
@@ -159,7 +241,7 @@ def _asked(stand: Stand, year: int) -> list[tuple[int, Act]]:
 def _due(
     stand: Stand, asked: list[tuple[int, Act]], measures: TreeMeasures
 ) -> list[tuple[int, Act]]:
-    """List the acts that are done, in their order: prunings, fellings, plantings, strokes."""
+    """List the acts that are done, in their order."""
     found = None
     due = []
     for i, act in asked:
@@ -171,8 +253,7 @@ def _due(
             if not condition.holds(float(found[condition.quantity][kind])):
                 continue
         due.append((i, act))
-    order = {"prune": 0, "plant": 2, "stroke": 3}
-    return sorted(due, key=lambda entry: order.get(entry[1].kind, 1))
+    return sorted(due, key=lambda entry: _ORDER.get(entry[1].kind, _FELLING))
 
 
 def _felling(
@@ -183,11 +264,14 @@ def _felling(
     gone: Sequence[str],
     number: int,
     where: str,
+    plan: YearOfActs,
 ) -> Felling:
     if isinstance(act, Fell):
         year = stand.year + 1
         rows = [row_of(stand.rows, i, where=f"{where}.tree_ids in {year}") for i in act.tree_ids]
         ids = [i for i, row in zip(act.tree_ids, rows, strict=True) if standing[row]]
+        if act.marked is not None:
+            ids += census.tree_id[standing & bearing(act.marked, stand, census, plan)].tolist()
         for name in act.residual:
             stand.residual.row_of(name, f"{where}.residual in {year}")
         names = [name for name in act.residual if name not in gone]
@@ -195,7 +279,7 @@ def _felling(
     if isinstance(act, Thin):
         chosen = to_thin(act, census, stand, standing, number)
         return Felling("thin", census.tree_id[np.sort(chosen)].tolist(), act.cause)
-    assert not isinstance(act, Prune | Plant | Stroke)
+    assert isinstance(act, Harvest)
     chosen = to_harvest(act, census, stand, standing)
     return Felling("harvest", census.tree_id[chosen].tolist(), "harvest")
 
@@ -229,15 +313,44 @@ def fill(
     return Places(new_x.tolist(), new_y.tolist(), [names[k] for k in kind])
 
 
-def cuts_of(act: Pruning, stand: Stand, census: Census, standing: Mask, where: str) -> Cuts:
+def bearing(word: str, stand: Stand, census: Census, plan: YearOfActs | None) -> Mask:
+    """Tell which trees bear a mark, those of the same year's plan as well."""
+    ids = stand.marks.bearing(word)
+    for marked in plan.markings.values() if plan is not None else ():
+        if marked.word == word:
+            ids += marked.tree_ids
+    return np.isin(census.tree_id, ids)
+
+
+def chosen_rows(
+    act: ChosenTrees,
+    stand: Stand,
+    census: Census,
+    standing: Mask,
+    where: str,
+    plan: YearOfActs | None = None,
+) -> list[int]:
+    """Find the rows of the trees that an act means; `where` names a key of it in messages."""
+    if act.ids:
+        return [row_of(stand.rows, i, where=where.format(act.ids_key)) for i in act.ids]
+    if act.marked is not None:
+        standing = standing & bearing(act.marked, stand, census, plan)
+    rows: list[int] = to_prune(act, act.thickest_ha, census, stand, standing).tolist()
+    return rows
+
+
+def cuts_of(
+    act: Pruning,
+    stand: Stand,
+    census: Census,
+    standing: Mask,
+    where: str,
+    plan: YearOfActs | None = None,
+) -> Cuts:
     """Find the metamers at which a pruning cuts; `where` names a key of it in messages."""
     arena, trees = stand.arena.metamers, stand.rows
-    if act.ids:
-        rows = [row_of(trees, i, where=where.format(act.ids_key)) for i in act.ids]
-    else:
-        rows = to_prune(act, act.thickest_ha, census, stand, standing).tolist()
     cuts: Cuts = {}
-    for row in rows:
+    for row in chosen_rows(act, stand, census, standing, where, plan):
         if act.metamer is None:
             serials = choose_branches(arena, trees, row, act)
         else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.record.schema import DEATH_CAUSES, EVENT_KINDS, FELLING_CAUSES, STATUS
+from forest.record.schema import DEATH_CAUSES, EVENT_KINDS, FELLING_CAUSES, STATUS, STAYING_KINDS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,8 +61,8 @@ def population_row(
             f" + {count['planted']} planted + {count['recruited']} recruited - {count['died']} died"
             f" - {count['felled']} felled - {count['windthrown']} windthrown is not {living} living"
         )
-    row = {"year": year, "living_before": living_before, **count, "living": living}
-    del row["pruned"]
+    changes = {kind: n for kind, n in count.items() if kind not in STAYING_KINDS}
+    row = {"year": year, "living_before": living_before, **changes, "living": living}
     return {name: np.array([value], np.int32) for name, value in row.items()}
 
 
@@ -95,7 +95,7 @@ def by_cause(population: pd.DataFrame, events: pd.DataFrame) -> pd.DataFrame:
     )
     kinds, causes = events["kind"].astype(str), events["cause"].astype(str)
     names = kinds.where(~kinds.isin(("died", "felled")), kinds + "_" + causes)
-    further = sorted(set(names) - {*known, "pruned"})
+    further = sorted(set(names) - {*known, *STAYING_KINDS})
     years = population["year"].to_numpy()
     ledger = population.set_index("year")[["living_before"]].astype(np.int64)
     for name in (*known, *further):

@@ -21,7 +21,7 @@ FILE_TYPE = "forest run"
 SCHEMA_VERSION = 2
 
 STATUS = ("living", "dead")
-EVENT_KINDS = ("planted", "recruited", "died", "felled", "pruned", "windthrown")
+EVENT_KINDS = ("planted", "recruited", "died", "felled", "pruned", "windthrown", "marked", "bent")
 CAUSES = (
     "none",
     "suppression",
@@ -56,7 +56,9 @@ DEATH_CAUSES = (
     "other",
 )
 FELLING_CAUSES = ("thinning", "harvest", "tending")
-ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest", "stroke")
+#: Events that change nothing in the number of trees.
+STAYING_KINDS = ("pruned", "marked", "bent")
+ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest", "mark", "bend", "obstacle", "stroke")
 STAGES = ("before", "after")
 RESIDUAL_STATUS = ("standing", "felled")
 

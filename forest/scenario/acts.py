@@ -8,19 +8,20 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from forest.errors import nearest
+from forest.scenario.choosing import MOST_IDS, ChosenTrees, Id, Word
 from forest.scenario.complete import check_spots
 from forest.scenario.cuttings import Harvest, Rule, Thin, check_rule
 from forest.scenario.model import PlantedTree, Plot
 from forest.scenario.placing import MOST_TREES, random_count
 from forest.scenario.regions import Region, check_region
+from forest.scenario.shaping import Bend, ChangeObstacle, Mark
 from forest.scenario.strokes import Stroke
 from forest.scenario.timing import Timing, check_timing
 from forest.species.schema import Refusal, Table, quantity, refusal
 
-_Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
 _Place = Annotated[float, Field(ge=0, le=10000)]
 _Spacing = Annotated[float, Field(ge=0.05, le=10000)]
-_MOST = 1_000_000
+_MOST = MOST_IDS
 #: Half of what a side holds, where a scenario does not say: a half plane.
 _HALF_PLANE_DEG = 90.0
 
@@ -87,19 +88,9 @@ class Branches(Table):
         return _HALF_PLANE_DEG if self.within_deg is None else self.within_deg
 
 
-class _TreesToPrune(Rule):
+class _TreesToPrune(ChosenTrees):
     """The keys of a pruning that do not choose branches; they come first in the documentation."""
 
-    _by_rule: ClassVar[tuple[str, ...]] = ("species", "min_dbh_cm", "max_dbh_cm")
-
-    tree_id: _Id | None = quantity(None, "the tree, or give tree_ids", unit="")
-    tree_ids: tuple[_Id, ...] | None = quantity(
-        None, "the trees", unit="", min_length=1, max_length=_MOST
-    )
-    thickest_ha: float | None = quantity(
-        None, "in place of ids: the thickest trees that have a dbh", unit="1/ha", gt=0, le=1e7
-    )
-    all_trees: Literal[True] | None = quantity(None, "in place of ids: all trees", unit="")
     metamer: int | None = quantity(
         None,
         "serial number of a metamer of the tree: it goes with all that it carries",
@@ -109,33 +100,14 @@ class _TreesToPrune(Rule):
     )
 
     @model_validator(mode="after")
-    def _names_its_trees(self) -> Self:
-        ways = ("tree_id", "tree_ids", "thickest_ha", "all_trees")
-        given = [key for key in ways if getattr(self, key) is not None]
-        if len(given) != 1:
-            what = " and ".join(given) + " are both given" if given else "missing"
-            key = "" if given else "tree_id"
-            raise Refusal(what, key=key, expected="one of " + ", ".join(ways))
+    def _metamer_of_one_tree(self) -> Self:
         if self.metamer is not None and self.tree_id is None:
+            ways = ("tree_ids", "thickest_ha", "all_trees", "marked")
+            given = next(key for key in ways if getattr(self, key) is not None)
             raise Refusal(
-                "a metamer is one tree's", key="metamer", expected=f"tree_id in place of {given[0]}"
+                "a metamer is one tree's", key="metamer", expected=f"tree_id in place of {given}"
             )
-        for key in self._by_rule:
-            if self.ids and getattr(self, key) is not None:
-                raise Refusal(
-                    f"given beside {given[0]}", key=key, expected="thickest_ha or all_trees"
-                )
         return self
-
-    @property
-    def ids(self) -> tuple[int, ...]:
-        """The trees; none if a rule chooses them."""
-        return (self.tree_ids or ()) if self.tree_id is None else (self.tree_id,)
-
-    @property
-    def ids_key(self) -> str:
-        """The key that names the trees."""
-        return "tree_ids" if self.tree_id is None else "tree_id"
 
 
 class Pruning(Branches, _TreesToPrune):
@@ -146,11 +118,7 @@ class Pruning(Branches, _TreesToPrune):
     @property
     def in_words(self) -> str:
         """Say what is done."""
-        if self.ids:
-            return "prune"
-        return (
-            "prune all trees" if self.all_trees else f"prune the {self.thickest_ha:g} thickest/ha"
-        )
+        return f"prune {self.trees_in_words}".rstrip()
 
 
 class Prune(Pruning, Timing):
@@ -165,7 +133,8 @@ class Fell(Timing):
     """Fell trees, residual trees, or both."""
 
     kind: Literal["fell"] = quantity("fell", "kind of act", unit="")
-    tree_ids: tuple[_Id, ...] = quantity((), "the trees", unit="", max_length=_MOST)
+    tree_ids: tuple[Id, ...] = quantity((), "the trees", unit="", max_length=_MOST)
+    marked: Word | None = quantity(None, "fells the trees that bear this mark", unit="")
     residual: tuple[str, ...] = quantity(
         (), "names of residual trees, or one name", unit="", max_length=10000
     )
@@ -180,14 +149,14 @@ class Fell(Timing):
 
     @model_validator(mode="after")
     def _fells_something(self) -> Self:
-        if not self.tree_ids and not self.residual:
-            raise Refusal("missing", key="tree_ids", expected="tree_ids or residual")
+        if not self.tree_ids and not self.residual and self.marked is None:
+            raise Refusal("missing", key="tree_ids", expected="tree_ids, marked or residual")
         return self
 
     @property
     def in_words(self) -> str:
         """Say what is done."""
-        return "fell"
+        return "fell" if self.marked is None else f"fell trees marked {self.marked}"
 
 
 class Planted(Table):
@@ -310,7 +279,10 @@ class Plant(Planted, Timing):
     kind: Literal["plant"] = quantity("plant", "kind of act", unit="")
 
 
-Act = Annotated[Prune | Fell | Plant | Thin | Harvest | Stroke, Field(discriminator="kind")]
+Act = Annotated[
+    Prune | Fell | Plant | Thin | Harvest | Mark | Bend | ChangeObstacle | Stroke,
+    Field(discriminator="kind"),
+]
 
 
 def check_acts(
@@ -383,21 +355,23 @@ def _check_room(act: Planted, start: str, plot: Plot) -> None:
 def _check_felled_once(acts: Sequence[Act], years: range) -> None:
     """Refuse to do something to a tree that is gone.
 
-    In one year pruning comes before felling, and strokes after it.
+    In one year felling comes after all but strokes.
     """
-    order = {"prune": 0, "fell": 1, "stroke": 2}
+    order = {"fell": 1, "stroke": 2}
     felled: dict[int, tuple[int, int]] = {}
     by_id = [
-        (year, order[act.kind], i, act)
+        (year, order.get(act.kind, 0), i, act)
         for i, act in enumerate(acts)
-        if act.when is None and isinstance(act, Prune | Fell | Stroke)
+        if act.when is None and isinstance(act, Prune | Fell | Mark | Bend | Stroke)
         for year in act.calendar_years(years)
     ]
     for year, _, i, act in sorted(by_id, key=lambda entry: entry[:3]):
-        if isinstance(act, Fell):
-            ids, key = act.tree_ids, "tree_ids"
-        else:
+        if isinstance(act, ChosenTrees | Stroke):
             ids, key = act.ids, act.ids_key
+        else:
+            ids, key = (
+                ((act.tree_id,), "tree_id") if isinstance(act, Bend) else (act.tree_ids, "tree_ids")
+            )
         for tree_id in ids:
             if tree_id in felled:
                 by, then = felled[tree_id]

@@ -14,6 +14,7 @@ from forest.scenario.model import Explicit, Random, Regular
 from forest.scenario.mortality import check_mortality
 from forest.scenario.regeneration import check_regeneration
 from forest.scenario.residual import check_felled_residual, check_residual
+from forest.scenario.shaping import check_shaping
 from forest.scenario.strokes import check_strokes
 from forest.scenario.wind import check_wind
 from forest.species.schema import Refusal
@@ -45,6 +46,7 @@ def check_fit(scenario: Scenario) -> None:
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.planned_calendar, regular)
     check_strokes(scenario.acts, scenario.environment)
+    check_shaping(scenario.acts, scenario.obstacles)
     residual = scenario.residual_trees
     check_residual(
         residual, scenario.planting, scenario.plot, scenario.species, scenario.environment

@@ -322,6 +322,7 @@ class Box(Table):
     """A box that blocks growth and casts shade."""
 
     kind: Literal["box"] = quantity("box", "kind of obstacle", unit="")
+    name: str = quantity("", "by which acts can move it or take it away", unit="", max_length=60)
     min_m: Point = quantity(..., "lower corner", unit="m")
     max_m: Point = quantity(..., "upper corner", unit="m")
 
@@ -335,11 +336,19 @@ class Box(Table):
             )
         return self
 
+    def moved(self, by_m: Point) -> Box:
+        """Give it in another place."""
+        low = tuple(a + b for a, b in zip(self.min_m, by_m, strict=True))
+        high = tuple(a + b for a, b in zip(self.max_m, by_m, strict=True))
+        return self.model_copy(update={"min_m": low, "max_m": high})
+
 
 class Mesh(Table):
     """A closed surface that blocks growth and casts shade."""
 
     kind: Literal["mesh"] = quantity("mesh", "kind of obstacle", unit="")
+    name: str = quantity("", "by which acts can move it or take it away", unit="", max_length=60)
+    at_m: Point = quantity((0.0, 0.0, 0.0), "where the file's origin stands", unit="m")
     file: str = quantity(
         ..., "surface file (.stl, .obj, .ply or .vtp); relative to the scenario", unit=""
     )
@@ -361,6 +370,11 @@ class Mesh(Table):
                 f"{info.data['file']!r} has changed", expected="the mesh that the scenario had"
             )
         return found
+
+    def moved(self, by_m: Point) -> Mesh:
+        """Give it in another place."""
+        at = tuple(a + b for a, b in zip(self.at_m, by_m, strict=True))
+        return self.model_copy(update={"at_m": at})
 
 
 Obstacle = Annotated[Box | Mesh, Field(discriminator="kind")]
