@@ -2,9 +2,9 @@
 
 "At each iteration of the modeling algorithm the brush position defines the center of a sphere
 within which marker points are generated." A stroke is a path of such spheres; between two points of
-the path the brush moves on a straight line and its radius changes linearly. Markers are one jittered
-point per cell of a grid, as the procedural ones are, kept where the spheres hold them; a cell has
-one marker however often the brush passes.
+the path the brush moves on a straight line and its radius changes linearly. Markers are one
+jittered point per cell of a grid, as the procedural ones are, kept where the spheres hold them; a
+cell has one marker however often the brush passes.
 
 All places are whole multiples of 2^-20 m, about a micrometre, so that a sum or difference of two of
 them is exact: what symmetric brushes lay is then symmetric exactly (`forest.environment.symmetry`).
@@ -68,26 +68,37 @@ def cut_path(
     spacing_m : float
         Edge of a marker's cell, m.
     """
-    moved = np.concatenate((np.ones(1, np.bool_), np.any(np.diff(points, axis=0) != 0.0, axis=1)))
-    radius = np.maximum.reduceat(radius, np.flatnonzero(moved))  # it stays and presses harder
-    points = points[moved]
+    if len(points) == 1:
+        return Pieces(points, points, radius, radius, np.zeros(1, np.int64))
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     along = np.concatenate((np.zeros(1), np.cumsum(length)))
-    total = along[-1]
+    borders = along[-1] * np.arange(1, parts) / parts
+    first, last = np.searchsorted(borders, along[:-1], "right"), np.searchsorted(borders, along[1:])
     coarse = np.maximum(np.maximum(radius[:-1], radius[1:]), spacing_m) * _LONGEST
-    pieces = np.maximum(np.ceil(length / coarse), 1.0).astype(np.int64)
-    if total == 0.0:
-        return Pieces(points, points, radius, radius, np.zeros(1, np.int64))
-    inner = [
-        np.linspace(a, b, n, endpoint=False)
-        for a, b, n in zip(along[:-1], along[1:], pieces, strict=True)
+    line, share = [], []
+    for s, n in enumerate(np.maximum(np.ceil(length / coarse), 1.0).astype(int)):
+        cuts = np.arange(n + 1) / n
+        if last[s] > first[s]:
+            here = (borders[first[s] : last[s]] - along[s]) / length[s]
+            cuts = np.unique(np.concatenate((cuts, here)))
+        line.append(np.full(len(cuts) - 1, s))
+        share.append(np.column_stack((cuts[:-1], cuts[1:])))
+    at, span = np.concatenate(line), np.concatenate(share)
+    ends = [
+        np.where(
+            t[:, None] == 1.0,
+            points[at + 1],
+            points[at] + t[:, None] * (points[at + 1] - points[at]),
+        )
+        for t in span.T
     ]
-    cuts = np.unique(np.concatenate((*inner, total * np.arange(1, parts) / parts, [total])))
-    place = np.column_stack([np.interp(cuts, along, column) for column in points.T])
-    wide = np.interp(cuts, along, radius)
-    middle = 0.5 * (cuts[:-1] + cuts[1:])
-    part = np.minimum((middle / total * parts).astype(np.int64), parts - 1)
-    return Pieces(place[:-1], place[1:], wide[:-1], wide[1:], part)
+    wide = [
+        np.where(t == 1.0, radius[at + 1], radius[at] + t * (radius[at + 1] - radius[at]))
+        for t in span.T
+    ]
+    middle = along[at] + span.mean(axis=1) * length[at]
+    part = np.searchsorted(borders, middle, "right").astype(np.int64)
+    return Pieces(ends[0], ends[1], wide[0], wide[1], part)
 
 
 @njit

@@ -74,7 +74,7 @@ class Envelope(NamedTuple):
 
 
 class Laid(NamedTuple):
-    """Markers that were laid: places (m), steps since which they are there, those taken for good."""
+    """Markers that were laid: places, m; steps since which they are there; taken for good?"""
 
     point: NDArray[np.float64]
     due: NDArray[np.int32]

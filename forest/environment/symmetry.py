@@ -1,8 +1,8 @@
 """Symmetric brushes: positions multiplied in space (Palubicki et al. 2009, section 5, Fig. 17).
 
 Markers lie on whole multiples of 2^-20 m, and so do centres and shifts once they are rounded. What
-is made of them by sign, exchange of x and y, and addition is therefore exact, and the set of markers
-is its own image, number by number, under
+is made of them by sign, exchange of x and y, and addition is therefore exact, and the set of
+markers is its own image, number by number, under
 
 * a mirror whose normal points along x, along y, or between them (multiples of 45 degrees);
 * quarter turns where the rotation is by a number that 4 divides, half turns where it is even;
