@@ -202,11 +202,6 @@ class Surroundings:
         """The far field, where the scenario has one."""
         return self._light.canopy
 
-    @property
-    def markers(self) -> MarkerSpace | None:
-        """The marker space, where the scenario has one."""
-        return self._markers
-
     def floor_light(self) -> float:
         """Mean relative irradiance at the ground, 0..1; NaN without a far field."""
         return self._light.floor_light()

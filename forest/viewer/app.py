@@ -213,20 +213,21 @@ class App:
     def _listen(self) -> None:
         self.server.controller.on_exception.add(self._fault)
         state, trigger = self.state, self.server.controller.trigger
-        state.change("step")(lambda **_: self._soon(self.show_year))
-        state.change("branches")(lambda **_: self._soon(self.show_year))
-        state.change("alone")(lambda **_: self._soon(self.show_year))
-        state.change("colour_by")(lambda **_: self._soon(self.show_colours))
+        state.change("step")(lambda **_: self.soon(self.show_year))
+        state.change("branches")(lambda **_: self.soon(self.show_year))
+        state.change("alone")(lambda **_: self.soon(self.show_year))
+        state.change("colour_by")(lambda **_: self.soon(self.show_colours))
         state.change("playing")(lambda **_: self._play())
-        state.change("tab")(lambda **_: self._soon(self.refresh_panels))
+        state.change("tab")(lambda **_: self.soon(self.refresh_panels))
         state.change("tool")(lambda **_: self._take_tool())
         trigger("pointer")(self._pointer)
+        trigger("wheel")(lambda turns: self.tried(lambda: self._tool.wheel(float(turns))))
         trigger("key")(self._key)
         trigger("look")(self.look)
         trigger("choose")(lambda tree_id: self.choose(tree_id))
         trigger("go")(self._go)
 
-    def _soon(self, draw: Callable[[], None]) -> None:
+    def soon(self, draw: Callable[[], None]) -> None:
         """Draw when the messages that wait are read: of a slider's many only the last counts."""
         if not self.server.running:
             return
@@ -240,9 +241,9 @@ class App:
         wanted, self._wanted = self._wanted, {}
         with self.state:
             for draw in wanted.values():
-                self._tried(draw)
+                self.tried(draw)
 
-    def _tried(self, draw: Callable[[], None]) -> None:
+    def tried(self, draw: Callable[[], None]) -> None:
         try:
             draw()
         except InputError as error:
@@ -279,8 +280,12 @@ class App:
         elif key == "Escape":
             self.choose(None)
 
+    @property
+    def _tool(self) -> Tool:
+        return self.tools[self.state.tool]
+
     def _take_tool(self) -> None:
-        tool = self.tools[self.state.tool]
+        tool = self._tool
         self.state.tool_drags = tool.drags
         self.state.tool_hint = tool.hint
 
@@ -288,12 +293,12 @@ class App:
         self, kind: str, across: float, down: float, width: float, height: float, pressure: float
     ) -> None:
         """Take a press, move or release of the pointer, at pixels of a view of this size."""
-        tool = self.tools[self.state.tool]
+        tool = self._tool
         if kind == "down":
             hit = self.stage.hit(across / width, down / height, pressure)
             self._pressed = (across, down, hit)
             if tool.drags:
-                self._tried(lambda: tool.drag(hit, hit, done=False))
+                self.tried(lambda: tool.drag(hit, hit, done=False))
             return
         if self._pressed is None:
             return
@@ -302,7 +307,7 @@ class App:
         if kind == "up":
             self._pressed = None
         if kind == "up" and still:
-            self._tried(lambda: tool.click(start))
+            self.tried(lambda: tool.click(start))
         elif tool.drags:
             now = self.stage.hit(across / width, down / height, pressure)
-            self._tried(lambda: tool.drag(start, now, done=kind == "up"))
+            self.tried(lambda: tool.drag(start, now, done=kind == "up"))

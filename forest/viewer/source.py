@@ -45,6 +45,24 @@ COLUMNS = (
 )
 
 
+_SCALED = ("dbh_cm", "height_m", "age", "ring_width_mm", "leaf_area_m2")
+
+
+def largest_of(trees: pd.DataFrame) -> dict[str, float]:
+    """Give the largest dbh, height, age and (all but a few) vigour of rows of `/trees`."""
+    from forest.viewer.colours import vigour
+
+    found = {
+        name: float(np.nanmax(trees[name].to_numpy(np.float64), initial=0.0))
+        for name in _SCALED[:3]
+    }
+    known = vigour(trees)
+    known = known[np.isfinite(known)]
+    # A few seedlings with a leaf or two would stretch the scale.
+    found["vigour"] = float(np.quantile(known, 0.98)) if len(known) else 0.0
+    return found
+
+
 class Source(Protocol):
     """What is shown: a run file, or a stand that lives.
 
@@ -151,19 +169,7 @@ class RunSource:
     @cached_property
     def largest(self) -> dict[str, float]:
         """Largest dbh, height, age and (all but a few) vigour of the run."""
-        from forest.viewer.colours import vigour
-
-        names = ["dbh_cm", "height_m", "age", "ring_width_mm", "leaf_area_m2"]
-        trees = self._run.read("trees", names)
-        found = {
-            name: float(np.nanmax(trees[name].to_numpy(np.float64), initial=0.0))
-            for name in names[:3]
-        }
-        known = vigour(trees)
-        known = known[np.isfinite(known)]
-        # A few seedlings with a leaf or two would stretch the scale.
-        found["vigour"] = float(np.quantile(known, 0.98)) if len(known) else 0.0
-        return found
+        return largest_of(self._run.read("trees", list(_SCALED)))
 
     def trees(self, year: int) -> pd.DataFrame:
         """Rows at the end of a year."""

@@ -272,6 +272,11 @@ class Stage:
 
     # ------------------------------------------------------------------ the pointer
 
+    @property
+    def looks(self) -> NDArray[np.float64]:
+        """The direction in which the camera looks, a unit vector."""
+        return np.array(self.plotter.camera.direction, np.float64)
+
     def ray(self, across: float, down: float) -> Ray:
         """Give the line of sight at a place of the picture: shares of its width and height."""
         width, height = self.window.GetSize()

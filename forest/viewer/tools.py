@@ -31,7 +31,10 @@ class Tool(Protocol):
         """Do what a click on something does."""
 
     def drag(self, start: Hit, now: Hit, *, done: bool) -> None:
-        """Follow a drag; `done` at its end."""
+        """Follow a drag; at its start `now` is `start`, at its end it is `done`."""
+
+    def wheel(self, turns: float) -> None:
+        """Take a turn of the wheel, towards the user if positive; only while it takes drags."""
 
 
 class PickTool:
@@ -58,3 +61,6 @@ class PickTool:
 
     def drag(self, start: Hit, now: Hit, *, done: bool) -> None:
         """Nothing: drags turn the view."""
+
+    def wheel(self, turns: float) -> None:
+        """Nothing: the wheel moves the view."""
