@@ -26,6 +26,7 @@ _THEME = {
 
 _STYLE = """
 html { overflow: hidden !important; }
+.v-application { outline: none; }
 body { font-family: Roboto, "Helvetica Neue", Arial, sans-serif; color: #2f3a33; }
 .view { position: relative; height: 100%; width: 100%; overflow: hidden; background: #dde6ea; }
 .legend { position: absolute; left: 14px; bottom: 14px; background: rgba(255,255,255,.88);
@@ -75,7 +76,9 @@ def build_page(app: App) -> None:
     from trame.widgets import vuetify3 as v
 
     with VAppLayout(app.server, vuetify_config=_THEME) as layout:
-        layout.root._attributes["keys"] = f'@keydown="{_KEYS}" tabindex="-1"'
+        layout.root._attributes["keys"] = (
+            f'@keydown="{_KEYS}" tabindex="-1" @vue:mounted="(node) => node.el.focus()"'
+        )
         client.Style(_STYLE)
         _bar(v)
         with v.VNavigationDrawer(
