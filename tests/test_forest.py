@@ -33,6 +33,8 @@ OF_KIND = {
     "planted": {"none"},
     "recruited": {"none"},
     "pruned": {"none"},
+    "marked": {"none"},
+    "bent": {"none"},
     "died": set(DEATH_CAUSES),
     "felled": set(FELLING_CAUSES),
     "windthrown": {"wind"},

@@ -10,6 +10,8 @@ import numpy as np
 
 from forest._threads import thread_count
 from forest.record import ledger
+from forest.record.checkpoint import remove_checkpoints
+from forest.record.export import whole_file
 from forest.record.schema import ALL_TABLES
 from forest.simulation import stored_tables, writer_of
 
@@ -61,8 +63,12 @@ def _with_population(records: Sequence[YearRecord]) -> list[dict[str, Mapping[st
 def write_run(
     scenario: Scenario, records: Sequence[YearRecord], path: Path, *, overwrite: bool
 ) -> None:
-    """Write the run file of some years."""
-    with writer_of(scenario, path, threads=thread_count(), overwrite=overwrite) as writer:
+    """Write the run file of some years, whole or not at all."""
+    with (
+        whole_file(path, overwrite=overwrite) as draft,
+        writer_of(scenario, draft, threads=thread_count()) as writer,
+    ):
         for record in records:
             writer.append_year(record.year, record.tables, record.samples)
         writer.finish()
+    remove_checkpoints(path)  # of what was replaced

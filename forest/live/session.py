@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from forest.errors import ActError, InputError
 from forest.live.preview import markers_to_come, preview
 from forest.live.records import tables_of, write_run
-from forest.live.saving import write_whole
 from forest.management.plan import YearOfActs, plan_year
+from forest.record.export import whole_file
 from forest.scenario.timing import Timing
 from forest.stand import Stand
 
@@ -244,9 +245,21 @@ class LiveSession:
     # ------------------------------------------------------------------ files
 
     def save(self, path: str | Path) -> None:
-        """Write the scenario that replays the session, whole or not at all."""
+        """Write the scenario that replays the session, whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written; what was there before stays.
+        """
         heading = "" if self._records else NOT_YET
-        write_whole(Path(path), heading + self.scenario.to_toml())
+        with (
+            whole_file(path, overwrite=True) as draft,
+            draft.open("w", encoding="utf-8") as file,
+        ):
+            file.write(heading + self.scenario.to_toml())
+            file.flush()
+            os.fsync(file.fileno())
 
     def keep_in(self, path: str | Path) -> None:
         """Keep the session in a file from now on: written anew after each act and step."""

@@ -195,7 +195,10 @@ def shape_to_come(
     bendings: Sequence[tuple[Bending, str]],
     solid: Solid,
 ) -> tuple[Arena, Trees]:
-    """Give a copy of a tree as cuts and then bendings leave it; raises as `bend` does."""
+    """Give a copy of a tree as cuts and then bendings leave it; raises as `bend` does.
+
+    A metamer that the cuts take is not bent.
+    """
     row = row_of(stand.rows, tree_id, where="Stand")
     place, tree = one_tree(stand.arena, stand.rows, row)
     for each in cuts:
@@ -203,6 +206,7 @@ def shape_to_come(
         if len(left):
             cut_branches(place, tree, 0, left, 1.0)
     for act, where in bendings:
-        if len(still_there(place.metamers, tree, 0, [act.metamer])):
+        was_there = len(still_there(stand.arena.metamers, stand.rows, row, [act.metamer]))
+        if not was_there or len(still_there(place.metamers, tree, 0, [act.metamer])):
             bend(stand, place, tree, 0, act, solid, where)
     return place, tree

@@ -44,7 +44,7 @@ def test_a_branch_is_bent_and_nothing_else(mechanics: tuple[str, ...]) -> None:
     stand = grown(*mechanics)
     before = stand.skeleton(1)
     metamer, end = limb(stand)
-    to = end + [0.03, -0.05, 0.06]
+    to = end + np.array([0.03, -0.05, 0.06])
     left = stand.bend(1, metamer, to)
     after = stand.skeleton(1)
     place = int(np.flatnonzero(before.serial == metamer)[0])
@@ -67,31 +67,41 @@ def test_a_branch_is_bent_and_nothing_else(mechanics: tuple[str, ...]) -> None:
 
 
 def test_a_bent_branch_stays_bent() -> None:
-    """Where trees bend, the joints keep the turn: it springs back only by what its load changed."""
-    stand, other = grown(BENDING), grown(BENDING)
+    """Where trees bend, the joints keep the turn: it springs back only by what its load changed.
+
+    Nothing rights it here; reaction wood may, over the years.
+    """
+    unrighted = "mechanics={righting='none'}"
+    stand, other = grown(unrighted), grown(unrighted)
     metamer, end = limb(stand)
-    to = end + [0.05, 0.05, 0.08]
+    to = end + np.array([0.05, 0.05, 0.08])
     stand.bend(1, metamer, to)
     bent = stand.skeleton(1)
     place = int(np.flatnonzero(bent.serial == metamer)[0])
     turned = np.linalg.norm(bent.end[place] - end)
+    assert stand.mechanics is not None
+    stand.mechanics.settle(stand.arena, stand.rows)
+    sprung = stand.skeleton(1).end[place]
+    assert np.linalg.norm(sprung - bent.end[place]) < 0.15 * turned
     steps(stand, 1), steps(other, 1)
     later, never = stand.skeleton(1), other.skeleton(1)
     now = later.end[later.serial == metamer][0]
     straight = never.end[never.serial == metamer][0]
     assert np.linalg.norm(now - straight) > 0.6 * turned
-    assert np.linalg.norm(now - bent.end[place]) < 0.4 * turned
 
 
 def test_the_light_sees_the_new_place() -> None:
-    """A crown that is bent away gets other light in the next year."""
+    """A branch that is bent gets the light of its new place in the next year."""
     one, other = grown(), grown()
     metamer, end = limb(one)
-    one.bend(1, metamer, end + [0.3, 0.0, 0.2])
-    a, b = steps(one, 1)[0], steps(other, 1)[0]
-    shape, twin = one.skeleton(1), other.skeleton(1)
-    assert len(shape) != len(twin) or (shape.end != twin.end).any()
-    assert a.tables["trees"]["height_m"].shape == b.tables["trees"]["height_m"].shape
+    one.bend(1, metamer, end + np.array([0.3, 0.0, 0.2]))
+    steps(one, 1), steps(other, 1)
+    light = []
+    for stand in (one, other):
+        arena, n = stand.arena.metamers, int(stand.rows.size[0])
+        light.append(dict(zip(arena.serial[:n].tolist(), arena.light[:n].tolist(), strict=True)))
+    both = light[0].keys() & light[1].keys()
+    assert any(light[0][serial] != light[1][serial] for serial in both)
 
 
 def test_bending_to_where_it_is_changes_nothing() -> None:
@@ -123,19 +133,19 @@ def test_never_into_the_ground_or_a_wall() -> None:
 
 def test_marks_name_trees_for_later_acts() -> None:
     scenario = tiny(
-        "acts=[{kind='mark', year=2002, thickest_ha=300, mark='crop'},"
+        "acts=[{kind='mark', year=2006, thickest_ha=300, mark='crop'},"
         "{kind='mark', year=2003, tree_ids=[5, 6], mark='out'},"
         "{kind='fell', year=2003, marked='out', cause='tending'},"
-        "{kind='prune', year=2006, marked='crop', below_share=0.5}]"
+        "{kind='prune', year=2007, marked='crop', below_share=0.5}]"
     )
     stand = Stand(scenario)
-    records = steps(stand, 6)
+    records = steps(stand, 7)
     events = [record.tables["events"] for record in records]
     crop = stand.marks.bearing("crop")
     assert len(crop) == 3
-    assert events[1]["tree_id"][events[1]["kind"] == 6].tolist() == crop
+    assert events[5]["tree_id"][events[5]["kind"] == 6].tolist() == crop
     assert sorted(events[2]["tree_id"][events[2]["kind"] == 3].tolist()) == [5, 6]
-    pruned = events[5]["tree_id"][events[5]["kind"] == 4].tolist()
+    pruned = events[6]["tree_id"][events[6]["kind"] == 4].tolist()
     assert pruned
     assert set(pruned) <= set(crop)
     assert stand.marks.of_tree(crop[0]) == ["crop"]
@@ -184,7 +194,7 @@ ACTS = {
     "marked": "{kind='mark', year=2003, thickest_ha=200, mark='crop'},"
     "{kind='prune', year=2006, marked='crop', below_share=0.4}",
     "moved": f"{{kind='obstacle', year=2003, add={WALL}}},"
-    "{kind='obstacle', year=2006, move='wall', by_m=[0, 0.4, 0]},"
+    "{kind='obstacle', year=2006, move='wall', by_m=[0, 0, 0.4]},"
     "{kind='obstacle', year=2008, remove='wall'}",
 }
 
@@ -220,7 +230,7 @@ def test_stopped_and_gone_on(name: str, settings: tuple[str, ...]) -> None:
 def test_regeneration_lives_under_the_new_light() -> None:
     """A roof over all takes the seedlings' light, and is there again after a restart."""
     settings = ("regeneration={}", "years=8")
-    roof = "{kind='box', name='roof', min_m=[0, 0, 4], max_m=[10, 10, 4.4]}"
+    roof = "{kind='box', name='roof', min_m=[0, 0, 4], max_m=[10, 10, 5]}"
     scenario = tiny(f"acts=[{{kind='obstacle', year=2003, add={roof}}}]", *settings)
     stand = Stand(scenario)
     steps(stand, 2)
@@ -244,7 +254,8 @@ REFUSED = {
     "nothing": ("{kind='obstacle', year=2003}", "nothing to do"),
     "no place": ("{kind='bend', year=2003, tree_id=1, metamer=2}", "missing key 'to_m'"),
     "felled before": (
-        "{kind='fell', year=2002, tree_ids=[1]}, {kind='bend', year=2003, tree_id=1, metamer=2, to_m=[0,0,1]}",
+        "{kind='fell', year=2002, tree_ids=[1]},"
+        "{kind='bend', year=2003, tree_id=1, metamer=2, to_m=[0,0,1]}",
         "tree 1 is felled by acts",
     ),
 }
@@ -261,7 +272,8 @@ def test_refused_in_one_line(name: str, tmp_path: Path) -> None:
 
 
 def test_refused_in_its_year() -> None:
-    twice = f"{{kind='obstacle', years=[2002, 2003], add={WALL.replace('0.0, 2.0, 0.0', '0.0, 2.0, 3.0').replace('1.0]', '4.0]')}}}"
+    wall = "{kind='box', name='wall', min_m=[0, 2, 5], max_m=[10, 2.6, 6]}"
+    twice = f"{{kind='obstacle', years=[2002, 2003], add={wall}}}"
     stand = Stand(tiny(f"acts=[{twice}]"))
     steps(stand, 2)
     before = stand.state()
@@ -276,7 +288,8 @@ def test_a_live_bend_shows_and_replays() -> None:
     for _ in range(4):
         session.step()
     metamer, end = limb(session.stand)
-    session.act(kind="bend", tree_id=1, metamer=metamer, to_m=(end + [0.02, 0.03, 0.04]).tolist())
+    to = end + np.array([0.02, 0.03, 0.04])
+    session.act(kind="bend", tree_id=1, metamer=metamer, to_m=to.tolist())
     shown = session.skeleton(1)
     assert (shown.end != session.stand.skeleton(1).end).any()
     assert session.trees().pending.tolist() == ["bend"]

@@ -20,6 +20,7 @@ SHIPPED = [
     "pruned_pine",
     "saxony_spruce",
     "self_thinning",
+    "shaped_tree",
 ]
 
 
