@@ -17,6 +17,7 @@ from forest.species.text import read_bytes, read_text
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".vtp")
 _LIMIT_M = 1e5
+_BRUSH_M = (1e-3, 1000.0)
 
 
 def locate(file: str, context: Any) -> Path:
@@ -215,7 +216,7 @@ def read_stroke(
         x, y, z = (_number(file, line, row, column) for column in ("x_m", "y_m", "z_m"))
         points.append((x, y, z))
         if "radius_m" in row:
-            radii.append(_number(file, line, row, "radius_m", (0.0, _LIMIT_M)))
+            radii.append(_number(file, line, row, "radius_m", _BRUSH_M))
     if not points:
         raise Refusal(f"{file!r} holds no point", expected="at least one row")
     return points, radii or None

@@ -18,7 +18,7 @@ from forest.species.schema import Refusal, Table, quantity, refusal
 MOST_MARKERS = 10_000_000
 _MOST_STEPS = 10_000
 
-_Radius = Annotated[float, Field(gt=0, le=1000)]
+_Radius = Annotated[float, Field(ge=1e-3, le=1000)]
 _Count = Annotated[int, Field(ge=1, le=10_000)]
 
 
@@ -230,9 +230,10 @@ class Stroking(Table):
         """Say what is done."""
         times = f" {self.copies} times" if self.copies > 1 else ""
         over = f" over {self.steps} years" if self.steps > 1 else ""
-        held = f", only metamer {self.metamer} of tree {self.tree_id} grows"
-        held = held if self.metamer is not None else ""
-        return f"lay a stroke{times}{over}{held}"
+        held = ""
+        if self.metamer is not None:
+            held = f" for metamer {self.metamer} of tree {self.tree_id} alone"
+        return f"lay a stroke{times}{held}{over}"
 
 
 class Stroke(Stroking, Timing):

@@ -20,6 +20,8 @@ _MOST_SPHERES = 20_000
 #: Least radius of wood and radius of a marker, as shares of the height of what is seen.
 _LEAST_WIDTH = 0.0006
 _MARKER_WIDTH = 0.0045
+#: Room above what is seen for a title, as a share of its height.
+_TITLE = 0.1
 
 
 class Panel(NamedTuple):
@@ -113,6 +115,8 @@ def draw_brushed(
         box_m = np.array([whole.min(axis=0), whole.max(axis=0)])
         box_m[0, 2] = min(box_m[0, 2], 0.0)
     (x0, y0, z0), (x1, y1, z1) = box_m
+    if any(one.title for one in panels):
+        z1 += _TITLE * (z1 - z0)
     corners = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (z0, z1)])
     columns = columns or len(panels)
     rows = -(-len(panels) // columns)

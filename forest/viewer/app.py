@@ -107,6 +107,7 @@ class App:
                 "tool": "pick",
                 "tool_list": [],
                 "tool_drags": False,
+                "tool_wheels": False,
                 "tool_hint": "",
                 "tab": "stand",
                 "message": "",
@@ -287,6 +288,7 @@ class App:
     def _take_tool(self) -> None:
         tool = self._tool
         self.state.tool_drags = tool.drags
+        self.state.tool_wheels = tool.wheels
         self.state.tool_hint = tool.hint
 
     def _pointer(

@@ -106,7 +106,7 @@ class BendTool(BranchTool):
     name = "bend"
     label = "Bend"
     icon = "mdi-vector-curve"
-    hint = "Drag a branch to where it shall go. Drag with the right button to turn the view."
+    hint = "Drag a branch to where it shall go. Alt and a drag turn the view."
     drags = True
 
     def __init__(self, desk: Desk) -> None:

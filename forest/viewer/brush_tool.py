@@ -29,9 +29,9 @@ class BrushTool(BranchTool):
     icon = "mdi-brush"
     hint = (
         "Draw from a branch or from the ground: shoots will follow. "
-        "The wheel changes the radius; the right button turns the view."
+        "The wheel changes the radius; Alt and a drag turn the view."
     )
-    drags = True
+    drags = wheels = True
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk)

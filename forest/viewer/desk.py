@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from forest.errors import InputError
 from forest.viewer.live_source import LiveSource
+from forest.viewer.pending import draw_obstacles, draw_pending
 
 if TYPE_CHECKING:
     from forest.live import LiveSession
@@ -66,10 +67,6 @@ class Desk:
         InputError
             If it is done now and cannot be; then nothing has changed.
         """
-        if self.app.year != self.source.now:
-            raise InputError(
-                f"{self.app.year} is past", expected=f"the stand as it is now, of {self.source.now}"
-            )
         if self.source.lock.locked():
             self._waiting.append(work)
             self.app.state.live_waiting = len(self._waiting)
@@ -79,7 +76,11 @@ class Desk:
         self._show()
 
     def act(self, **keys: Any) -> None:
-        """Queue an act for the next step; raises as `do` does."""
+        """Queue an act for the next step; raises as `do` does, and where a past year is shown."""
+        if self.app.year != self.source.now:
+            raise InputError(
+                f"{self.app.year} is past", expected=f"the stand as it is now, of {self.source.now}"
+            )
         self.do(lambda session: session.act(**keys))
 
     def finish(self) -> None:
@@ -160,4 +161,10 @@ class Desk:
             app.state.step = len(source.years) - 1
         for tell in self.changed:
             tell()
+        self.draw()
         app.show_year()
+
+    def draw(self, moved: Mapping[str, Sequence[float]] | None = None) -> None:
+        """Draw what waits for the next year, and obstacles, some of them moved (`draw_obstacles`)."""
+        draw_pending(self.app.stage, self.source)
+        draw_obstacles(self.app.stage, self.source, moved)

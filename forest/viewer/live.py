@@ -58,4 +58,5 @@ class LivePart:
         self.desk.changed.append(lay_down)
         app.state.change("tool")(take)
         app.state.change("chosen")(come_near)
+        self.desk.draw()
         return WorkPanel(self.desk, tools)

@@ -74,6 +74,9 @@ class LiveSource:
         self.now = self._first_year if not records else records[-1].year
         self.largest = largest_of(self._trees if len(records) else self._at_first)
         self.living = self.session.trees()
+        self.pending = self.session.pending
+        self.obstacles = self.session.obstacles
+        self.markers_to_come = self.session.markers_to_come
         self._metamers = dict(
             zip(
                 self.living["tree_id"].astype(int),

@@ -23,7 +23,7 @@ class LiveTool:
     """
 
     name = label = icon = hint = ""
-    drags = False
+    drags = wheels = False
     #: Whether it works on branches, so that they are shown while it is in hand.
     on_branches = False
 

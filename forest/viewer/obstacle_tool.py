@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from forest.scenario.model import Box
+from forest.scenario.shaping import ChangeObstacle
 from forest.viewer.desk import Desk
 from forest.viewer.live_tools import LiveTool
 from forest.viewer.picking import Hit, Ray
@@ -79,12 +80,12 @@ class ObstacleTool(LiveTool):
         try:
             self.desk.act(kind="obstacle", move=name, by_m=self._by)
         finally:
-            self.desk.draw_obstacles()
+            self.desk.draw()
             self.app.push()
 
     def _draw_moved(self) -> None:
         if self._moved is not None:
-            self.desk.draw_obstacles({self._moved: self._by})
+            self.desk.draw({self._moved: self._by})
             self.app.push()
 
     def _boxes(self) -> list[Box]:
@@ -100,8 +101,9 @@ class ObstacleTool(LiveTool):
         return min(found)[1] if found else None
 
     def _new_name(self) -> str:
+        acts = self.desk.source.scenario.acts
         names = {each.name for each in self.desk.source.obstacles}
-        names |= {str(name) for name in self.desk.source.obstacle_names}
+        names |= {act.target for act in acts if isinstance(act, ChangeObstacle)}
         number = 1
         while f"box {number}" in names:
             number += 1

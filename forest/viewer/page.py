@@ -37,7 +37,7 @@ body { font-family: Roboto, "Helvetica Neue", Arial, sans-serif; color: #2f3a33;
 .ends { display: flex; justify-content: space-between; width: 200px; }
 .hint { position: absolute; left: 14px; top: 10px; font-size: 12.5px; color: #4a564e;
   background: rgba(255,255,255,.75); border-radius: 6px; padding: 3px 9px; pointer-events: none; }
-.catcher { position: absolute; inset: 0; cursor: crosshair; touch-action: none; }
+.draws { cursor: crosshair; touch-action: none; }
 .year { font-size: 22px; font-weight: 500; min-width: 64px; text-align: center;
   font-variant-numeric: tabular-nums; }
 .panel h3 { font-size: 14px; font-weight: 500; margin: 14px 0 2px; }
@@ -62,6 +62,12 @@ def _pointer(kind: str) -> str:
     return f"trigger('pointer', ['{kind}', {_PLACE}])"
 
 
+# A tool takes the left button; with Alt held the view takes it even from tools that drag.
+_OURS = "$event.button === 0 && !$event.altKey"
+_HOLD = (
+    "tool_drags && ($event.stopPropagation(), "
+    "$event.currentTarget.setPointerCapture($event.pointerId))"
+)
 _KEYS = (
     "if (!$event.target.closest('input, textarea, [role=slider], [role=listbox]') "
     "&& ['ArrowLeft', 'ArrowRight', 'Home', 'End', ' ', 'Escape'].includes($event.key)) "
@@ -153,8 +159,13 @@ def _view(app: App, html: Any) -> None:
     with html.Div(
         style="position: absolute; inset: 0;",
         raw_attrs=[
-            f'@pointerdown.capture="$event.button === 0 && {_pointer("down")}"',
-            f'@pointerup.capture="$event.button === 0 && {_pointer("up")}"',
+            f'@pointerdown.capture="{_OURS} && ({_HOLD}, {_pointer("down")})"',
+            f'@pointermove.capture="tool_drags && ($event.buttons & 1) && !$event.altKey '
+            f'&& ($event.stopPropagation(), {_pointer("move")})"',
+            f'@pointerup.capture="{_OURS} && {_pointer("up")}"',
+            "@wheel.capture=\"tool_wheels && ($event.preventDefault(), $event.stopPropagation(), "
+            "trigger('wheel', [$event.deltaY]))\"",
+            ":class=\"tool_drags ? 'draws' : ''\"",
         ],
         id="picture",
     ):
@@ -166,16 +177,6 @@ def _view(app: App, html: Any) -> None:
             still_quality=90,
         )
     app.server.controller.view_update = view.update
-    html.Div(
-        v_if=("tool_drags",),
-        classes="catcher",
-        raw_attrs=[
-            '@pointerdown="$event.button === 0 && '
-            f'($event.target.setPointerCapture($event.pointerId), {_pointer("down")})"',
-            f'@pointermove="$event.buttons & 1 && {_pointer("move")}"',
-            f'@pointerup="$event.button === 0 && {_pointer("up")}"',
-        ],
-    )
     html.Div("{{ tool_hint }}", v_if=("tool_hint",), classes="hint")
     with html.Div(classes="legend", id="legend"):
         html.B("{{ legend.title }}")

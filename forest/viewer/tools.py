@@ -18,7 +18,9 @@ class Tool(Protocol):
     label, icon, hint : str
         Its button's title, its icon (mdi-...), and what to do with it, in a short sentence.
     drags : bool
-        Whether it takes drags; the view then does not turn.
+        Whether it takes drags; the view then turns only with Alt held.
+    wheels : bool
+        Whether it takes the wheel; the view then does not come nearer with it.
     """
 
     name: str
@@ -26,6 +28,7 @@ class Tool(Protocol):
     icon: str
     hint: str
     drags: bool
+    wheels: bool
 
     def click(self, hit: Hit) -> None:
         """Do what a click on something does."""
@@ -34,7 +37,7 @@ class Tool(Protocol):
         """Follow a drag; at its start `now` is `start`, at its end it is `done`."""
 
     def wheel(self, turns: float) -> None:
-        """Take a turn of the wheel, towards the user if positive; only while it takes drags."""
+        """Take a turn of the wheel, towards the user if positive."""
 
 
 class PickTool:
@@ -51,6 +54,7 @@ class PickTool:
     icon = "mdi-cursor-default-click-outline"
     hint = "Click a tree to see its card."
     drags = False
+    wheels = False
 
     def __init__(self, choose: Callable[[int | None], None]) -> None:
         self._choose = choose

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from forest.errors import ActError, InputError
-from forest.record.checkpoint import latest_checkpoint, read_checkpoint
+from forest.record.checkpoint import latest_checkpoint
 from forest.record.schema import ACT_KINDS
 from forest.scenario import Scenario
 from forest.simulation import simulate
 from forest.stand import Stand
-from forest.trees.metamers import NO_ROOM_LATERAL, NO_ROOM_TERMINAL
+from forest.trees.metamers import LATERAL, NO_ROOM_LATERAL, NO_ROOM_TERMINAL
 from tests.reference.brush import distance_beyond
 from tests.tiny import assert_same_runs, assert_same_state, steps, tiny
 
@@ -82,12 +82,16 @@ def test_parts_are_laid_year_by_year() -> None:
         assert top < 0.1 + 0.5 * (k + 1) + 0.2 + INTERNODE
 
 
+def extent(stand: Stand) -> slice:
+    """The first tree's part of the arena."""
+    start = int(stand.rows.start[0])
+    return slice(start, start + int(stand.rows.size[0]))
+
+
 def other_buds(stand: Stand, serials: np.ndarray) -> dict[str, np.ndarray]:
     """Give what a constrained stroke may not change: all fields but thickness and light."""
-    arena = stand.arena.metamers
-    at = int(stand.rows.start[0]) + np.searchsorted(
-        arena.serial[: int(stand.rows.size[0])], serials
-    )
+    arena, part = stand.arena.metamers, extent(stand)
+    at = part.start + np.searchsorted(arena.serial[part], serials)
     kept = {name: field[at] for name, field in arena._asdict().items()}
     for name in ("pipe", "sapwood", "light", "resource"):
         del kept[name]
@@ -102,13 +106,12 @@ def test_a_constrained_stroke_moves_no_other_bud(mode: str) -> None:
     if mode == "mass_balance":
         steps(stand, 3)
     before = stand.skeleton(1)
-    lateral = int(before.serial[np.flatnonzero(before.leafy)[len(before) // 3]])
-    state = stand.arena.metamers.state[int(stand.rows.start[0]) : int(stand.rows.size[0])]
-    place = int(np.searchsorted(before.serial, lateral))
-    assert state[place] & 4
+    may = np.flatnonzero(stand.arena.metamers.state[extent(stand)] & int(LATERAL))
+    place = int(may[len(may) // 2])
+    lateral = int(before.serial[place])
     old = other_buds(stand, before.serial)
     foot = before.end[place]
-    heading = stand.arena.metamers.bud[int(stand.rows.start[0]) + place]
+    heading = stand.arena.metamers.bud[extent(stand)][place]
     path = [(foot + t * heading).tolist() for t in (0.3, 0.8)]
     stand.stroke(
         path, 0.3, tree_id=1, metamer=lateral, bud="lateral", from_metamer=lateral, hold_steps=4
@@ -127,9 +130,12 @@ def test_a_constrained_stroke_moves_no_other_bud(mode: str) -> None:
         while grown[k]:
             k = after.parent[k]
         assert after.serial[k] == lateral
-    steps(stand, 3)  # it is over: the others go on
+    steps(stand, 3)  # it is over: the others grow on, or are shed
     later = stand.skeleton(1)
-    assert later.end[:, 2].max() > after.end[:, 2].max() + INTERNODE
+    if mode == "paper":
+        assert not set(after.serial) <= set(later.serial)
+    else:
+        assert later.end[:, 2].max() > after.end[:, 2].max() + INTERNODE
 
 
 def test_other_trees_go_on() -> None:
@@ -205,7 +211,9 @@ def test_strokes_on_file_resumed_and_on_threads(tmp_path: Path) -> None:
         table = whole.treatments
         assert set(table.kind) == {"stroke"}
         assert sorted(set(table.year)) == [2001, 2006, 2007, 2008]
-    arrays, meta = read_checkpoint(latest_checkpoint(tmp_path / "one.h5"))
+    found = latest_checkpoint(tmp_path / "one.h5")
+    assert found is not None
+    arrays, meta = found
     resumed = Stand.restore(tree(acts(), every), arrays, meta)
     by_hand = Stand(tree(every))
     for year in range(2001, 2013):
@@ -287,7 +295,7 @@ BASE = "kind='stroke', year=2001"
             "counts=[9999, 9999]}",
             "tiling: 99,980,001 copies",
         ),
-        ("points_m='none.csv', radius_m=1", "points_m: cannot read"),
+        ("points_m='none.csv', radius_m=1", "points_m: no such file"),
     ],
 )
 def test_bad_strokes_are_refused_before_the_run(keys: str, says: str) -> None:
@@ -300,7 +308,7 @@ def test_strokes_need_markers() -> None:
     act = f"acts=[{{{BASE}, points_m=[[4,4,1]], radius_m=1}}]"
     with pytest.raises(InputError, match=r"acts\[0\]: no bud perceives markers; expected a table"):
         tiny(act)
-    with pytest.raises(InputError, match="Stand.stroke: no bud perceives markers"):
+    with pytest.raises(InputError, match="no bud perceives markers"):
         Stand(tiny()).stroke([[4, 4, 1]], 1)
 
 
