@@ -97,7 +97,9 @@ class PruneTool(BranchTool):
         """Say what is lit."""
         with html.Div(v_if=("prune_lit",)):
             html.Div("{{ prune_lit }}", id="prune-lit")
-            v.VBtn("Cut it", variant="tonal", size="small", click="trigger('prune_lit')", id="cut-it")
+            v.VBtn(
+                "Cut it", variant="tonal", size="small", click="trigger('prune_lit')", id="cut-it"
+            )
 
 
 class BendTool(BranchTool):

@@ -165,6 +165,6 @@ class Desk:
         app.show_year()
 
     def draw(self, moved: Mapping[str, Sequence[float]] | None = None) -> None:
-        """Draw what waits for the next year, and obstacles, some of them moved (`draw_obstacles`)."""
+        """Draw what waits for the next year, and obstacles; `moved` as in `draw_obstacles`."""
         draw_pending(self.app.stage, self.source)
         draw_obstacles(self.app.stage, self.source, moved)

@@ -29,7 +29,9 @@ def draw_segments(
         return
     ends = np.stack((start, end), axis=1).reshape(-1, 3).astype(np.float32)
     mesh = import_pyvista().line_segments_from_points(ends)
-    stage.put(name, lambda plotter: plotter.add_mesh(mesh, color=colour, line_width=width, **_PLAIN))
+    stage.put(
+        name, lambda plotter: plotter.add_mesh(mesh, color=colour, line_width=width, **_PLAIN)
+    )
 
 
 def draw_points(stage: Stage, name: str, points: Points, colour: str, size: float) -> None:

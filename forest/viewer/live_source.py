@@ -130,7 +130,8 @@ class LiveSource:
             return tuple(self._skeletons)
         if sum(self._metamers.values()) <= _MOST_METAMERS:
             return tuple(self._metamers)
-        found, room = [], _MOST_METAMERS
+        found: list[int] = []
+        room = _MOST_METAMERS
         for tree_id in self._near:
             room -= self._metamers.get(tree_id, 0)
             if tree_id in self._metamers and (room >= 0 or not found):

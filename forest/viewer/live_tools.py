@@ -73,7 +73,9 @@ class FellTool(LiveTool):
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk)
-        self.state.update({"fell_ids": "", "fell_rule": "below", "fell_to": "n_ha", "fell_value": 0})
+        self.state.update(
+            {"fell_ids": "", "fell_rule": "below", "fell_to": "n_ha", "fell_value": 0}
+        )
         self.app.server.controller.trigger("fell_list")(lambda: self.app.tried(self._by_list))
         self.app.server.controller.trigger("fell_rule")(lambda: self.app.tried(self._by_rule))
 

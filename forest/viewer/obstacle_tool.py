@@ -38,9 +38,7 @@ class ObstacleTool(LiveTool):
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk)
-        self.state.update(
-            {"box_width": 2.0, "box_depth": 0.3, "box_height": 2.0, "box_names": []}
-        )
+        self.state.update({"box_width": 2.0, "box_depth": 0.3, "box_height": 2.0, "box_names": []})
         self._moved: str | None = None
         self._by = [0.0, 0.0, 0.0]
         desk.app.server.controller.trigger("remove_box")(

@@ -163,7 +163,7 @@ def _view(app: App, html: Any) -> None:
             f'@pointermove.capture="tool_drags && ($event.buttons & 1) && !$event.altKey '
             f'&& ($event.stopPropagation(), {_pointer("move")})"',
             f'@pointerup.capture="{_OURS} && {_pointer("up")}"',
-            "@wheel.capture=\"tool_wheels && ($event.preventDefault(), $event.stopPropagation(), "
+            '@wheel.capture="tool_wheels && ($event.preventDefault(), $event.stopPropagation(), '
             "trigger('wheel', [$event.deltaY]))\"",
             ":class=\"tool_drags ? 'draws' : ''\"",
         ],

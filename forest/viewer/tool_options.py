@@ -14,7 +14,9 @@ class Options(Protocol):
         Its name.
     """
 
-    tool: str
+    @property
+    def tool(self) -> str:
+        """Its name."""
 
     def build(self, v: Any, html: Any) -> None:
         """Make its widgets, of vuetify and plain HTML."""
