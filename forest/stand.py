@@ -19,7 +19,7 @@ from forest.environment.climate import Climate
 from forest.environment.surroundings import Surroundings
 from forest.growth import budget
 from forest.growth.allocate import allocate
-from forest.growth.dealing import Deal, Workbench, deal
+from forest.growth.dealing import Deal, Workbench, deal, leave_out
 from forest.growth.parameters import Year, species_traits
 from forest.growth.pipes import NO_NEED, thicken
 from forest.growth.shedding import shed
@@ -89,6 +89,8 @@ class Stand(management.Hand):
         Light and space.
     built : Built or None
         How near the first trees are to the inventory that they were built from.
+    brush : Brush
+        The strokes of the procedural brush.
     treatments : Treatments
         What acts changed since the last record.
     marks : Marks
@@ -138,12 +140,14 @@ class Stand(management.Hand):
         self.marks = management.Marks()
         self.obstacles = management.Obstacles(self)
         self.storms = Storms(scenario, self.pipe_exponent)
+        self.brush = management.Brush()
         self.memories: dict[str, Memory] = {
             "obstacles": self.obstacles,
             "surroundings": self.surroundings,
             "marks": self.marks,
             "treatments": self.treatments,
             "storms": self.storms,
+            "brush": self.brush,
         }
         self.residual = ResidualTrees(scenario, self.surroundings)
         if self.residual.trees:
@@ -193,9 +197,9 @@ class Stand(management.Hand):
         before = sample_serials(self)
         self._lap("deal")
 
-        self._expose()
+        held = self._expose()
         self._allocate(shared, year, accounts)
-        self._shed(shared)
+        self._shed(leave_out(shared, held) if len(held) else shared)
         shared = self._extend(year)
         rings = self._note_pipes()
         self._thicken(shared, year, accounts)
@@ -211,12 +215,16 @@ class Stand(management.Hand):
             self._lap("regenerate")
         return record
 
-    def _expose(self) -> None:
+    def _expose(self) -> NDArray[np.int64]:
+        """Expose the buds; give the rows of trees of which parts are held dormant."""
         dead = None
         if self.dead_wood is not None:
             dead = self.dead_wood.plant_area(self.steps, self.surroundings.voxel_m)
-        self.surroundings.expose(self.arena.metamers, self.rows, self.steps, dead)
+        holds = self.brush.holds(self)
+        self.surroundings.expose(self.arena.metamers, self.rows, self.steps, dead, holds)
         self._lap("expose")
+        held = np.array(sorted({hold.tree_id for hold in holds}), np.int64)
+        return np.searchsorted(self.rows.tree_id, held).astype(np.int64)
 
     def _allocate(self, shared: Deal, year: Year, accounts: NDArray[np.float64]) -> None:
         allocate(
@@ -380,6 +388,13 @@ class Stand(management.Hand):
         import pandas as pd
 
         return pd.DataFrame(snag_columns(self))
+
+    @property
+    def strokes(self) -> pd.DataFrame:
+        """The strokes so far, a row each: markers laid, and how many of them are colonised."""
+        import pandas as pd
+
+        return pd.DataFrame(self.brush.columns(self))
 
     def measure(self) -> TreeMeasures:
         """Measure all living trees."""

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 
 import forest
+from forest._threads import most_threads, using_threads
 from forest.view.looks import look_of
 
 
@@ -34,6 +35,13 @@ def one_line_errors() -> Iterator[None]:
     except (forest.InputError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None
+
+
+@contextmanager
+def threads(wanted: int | None) -> Iterator[None]:
+    """Compute with so many threads, all by default, where no run is written."""
+    with using_threads(min(wanted or most_threads(), most_threads())):
+        yield
 
 
 def _short(value: float) -> str:

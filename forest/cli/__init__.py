@@ -22,6 +22,7 @@ from forest.cli.reading import info, landscape, picture, stability, table
 from forest.cli.ringing import rings
 from forest.cli.scenery import scene
 from forest.cli.shared import Stopped
+from forest.cli.showing import view
 from forest.cli.surfacing import mesh
 from forest.cli.viewing import stand_view
 
@@ -59,6 +60,7 @@ for _command in (
     bark,
     species,
     picture,
+    view,
     stand_view,
     scene,
     tree,

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.environment import marker_directions, marker_kernels, marker_tiles
+from forest.environment.dormant import Hold, dormant_buds
 from forest.environment.marker_buds import Buds, BudSpace, list_buds
 from forest.environment.marker_tiles import (
     CELLS,
@@ -72,6 +73,14 @@ class Envelope(NamedTuple):
     size_m: tuple[float, float, float]
 
 
+class Laid(NamedTuple):
+    """Markers that were laid: places, m; steps since which they are there; taken for good?"""
+
+    point: NDArray[np.float64]
+    due: NDArray[np.int32]
+    gone: NDArray[np.bool_]
+
+
 class MarkerSpace:
     """The markers of a plot and the state they are in.
 
@@ -93,6 +102,9 @@ class MarkerSpace:
         If given, procedural markers exist only inside these (and above ground).
     clouds : float64 (n, 3), optional
         Explicit markers, present wherever they are (on a periodic plot, wrapped into it).
+    everywhere : bool
+        Whether there are procedural markers where there is no envelope; if not, explicit markers
+        are all there are.
     """
 
     def __init__(
@@ -104,18 +116,16 @@ class MarkerSpace:
         release: bool,
         envelopes: Sequence[Envelope] = (),
         clouds: NDArray[np.float64] | None = None,
+        everywhere: bool = True,
     ) -> None:
         size = np.array(size_m, np.float64)
         self._seed = np.uint64(seed)
         self._cell = np.full(3, spacing_m, np.float64)
         self._cells = np.zeros(2, np.int64)
-        points = np.zeros((0, 3)) if clouds is None else np.array(clouds, np.float64)
-        self._points = points.reshape(-1, 3)
+        self._size = size
         if periodic:
             self._cells = np.maximum(np.rint(size / spacing_m), 1.0).astype(np.int64)
             self._cell[:2] = size / self._cells
-            self._points[:, :2] %= size
-            self._points[:, :2][self._points[:, :2] >= size] = 0.0  # a rounded-up remainder
             envelopes = _with_copies(envelopes, size)
         self._release = release
         self._envelopes = Envelopes(
@@ -123,14 +133,73 @@ class MarkerSpace:
             np.array([e.center_m for e in envelopes], np.float64).reshape(-1, 3),
             np.array([e.size_m for e in envelopes], np.float64).reshape(-1, 3),
         )
+        self._explicit_alone = not everywhere and not envelopes
+        if self._explicit_alone:  # an envelope that nothing lies in
+            nowhere = np.full((1, 3), -np.inf)
+            self._envelopes = Envelopes(np.zeros(1, np.int64), nowhere, np.ones((1, 3)))
         self._gone = np.zeros((0, 0, 0), np.uint64)
         self._gone_low = np.zeros(3, np.int64)
-        self._cloud_gone = np.zeros(len(self._points), np.uint8)
+        self._points = np.zeros((0, 3))
+        self._due = np.zeros(0, np.int32)
+        self._cloud_gone = np.zeros(0, np.uint8)
+        self._clouds = 0
+        if clouds is not None and len(clouds):
+            self.lay(clouds, np.zeros(len(clouds), np.int32))
+            self._clouds = len(self._points)
 
     @property
     def cell_m(self) -> NDArray[np.float64]:
         """Edges of a cell along x, y and z, m."""
         return self._cell.copy()
+
+    @property
+    def cells(self) -> NDArray[np.int64]:
+        """Cells along x and y of a periodic plot; 0 where there is no end."""
+        return self._cells.copy()
+
+    @property
+    def seed(self) -> np.uint64:
+        """Seed of the markers' places in their cells."""
+        return self._seed
+
+    @property
+    def envelopes(self) -> Envelopes:
+        """Regions outside which there are no procedural markers."""
+        return self._envelopes
+
+    @property
+    def cloud(self) -> NDArray[np.float64]:
+        """Explicit markers, float64 (n, 3), m."""
+        return self._points.copy()
+
+    def lay(self, points: NDArray[np.float64], due: NDArray[np.int32]) -> None:
+        """Add explicit markers.
+
+        Parameters
+        ----------
+        points : float64 (n, 3)
+            Their places, m; on a periodic plot they are wrapped into it.
+        due : int32 (n,)
+            Step from which on each is there.
+        """
+        new = np.array(points, np.float64).reshape(-1, 3)
+        if self._cells[0]:
+            new[:, :2] %= self._size
+            new[:, :2][new[:, :2] >= self._size] = 0.0  # a rounded-up remainder
+        self._points = np.concatenate((self._points, new))
+        self._due = np.concatenate((self._due, due.astype(np.int32)))
+        self._cloud_gone = np.concatenate((self._cloud_gone, np.zeros(len(new), np.uint8)))
+
+    @property
+    def laid(self) -> Laid:
+        """The markers that were laid since the start, in the order in which they were."""
+        n = self._clouds
+        return Laid(self._points[n:], self._due[n:], self._cloud_gone[n:] != 0)
+
+    @property
+    def release(self) -> bool:
+        """Whether a marker is free again when the bud that took it is gone."""
+        return self._release
 
     def claim(
         self,
@@ -138,6 +207,9 @@ class MarkerSpace:
         trees: Trees,
         species: MarkerSpecies,
         standing: StandingSites | None = None,
+        *,
+        step: int = 0,
+        holds: Sequence[Hold] = (),
     ) -> BudSpace:
         """Take the markers near living buds and share out the others.
 
@@ -149,6 +221,11 @@ class MarkerSpace:
             Parameters of each species in the table.
         standing : StandingSites, optional
             Points that take markers beside the buds, and perceive none.
+        step : int
+            Explicit markers that are due later are not there yet.
+        holds : sequence of Hold
+            What may grow of trees that are held: their other buds take markers near them, but
+            perceive none.
 
         Returns
         -------
@@ -159,13 +236,17 @@ class MarkerSpace:
         sites = _sites(species)
         n = len(buds.species)
         competitors = buds
+        if holds:
+            competitors, sites = _with_dormant(
+                buds, sites, dormant_buds(buds, metamers, trees, holds)
+            )
         if standing is not None:
-            competitors, sites = _with_standing(buds, sites, standing)
+            competitors, sites = _with_standing(competitors, sites, standing)
         found = np.zeros(n, np.int32)
         direction = np.zeros((n, 3), np.float32)
         lattice = self._lattice(competitors, sites)
         if lattice is not None:
-            found, direction = self._share_out(lattice, competitors, sites)
+            found, direction = self._share_out(lattice, competitors, sites, step)
             found, direction = found[:n], direction[:n]
         return BudSpace(
             buds.first_of_tree, buds.tree_row, buds.metamer, buds.kind, found, direction
@@ -173,27 +254,35 @@ class MarkerSpace:
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Give the arrays that the next year needs beside the stand (empty with `release`)."""
-        return {
+        state: dict[str, NDArray[np.generic]] = {
             "gone": self._gone.copy(),
             "gone_low": self._gone_low.copy(),
             "cloud_gone": self._cloud_gone.copy(),
         }
+        if len(self._points) > self._clouds:
+            state["laid"] = self._points[self._clouds :].copy()
+            state["due"] = self._due[self._clouds :].copy()
+        return state
 
     def restore(self, state: Mapping[str, NDArray[np.generic]]) -> None:
         """Take back what `state` gave."""
+        if "laid" in state:
+            n = self._clouds
+            self._points = np.concatenate((self._points[:n], np.array(state["laid"], np.float64)))
+            self._due = np.concatenate((self._due[:n], np.array(state["due"], np.int32)))
         self._gone = np.array(state["gone"], np.uint64)
         self._gone_low = np.array(state["gone_low"], np.int64)
         self._cloud_gone = np.array(state["cloud_gone"], np.uint8)
 
     def _share_out(
-        self, lattice: Lattice, buds: Buds, sites: Sites
+        self, lattice: Lattice, buds: Buds, sites: Sites, step: int
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Count the markers of each bud and find its best direction."""
         entries = marker_tiles.sort_buds(buds, sites, lattice)
         near = _rows(lattice, float(sites.occupancy.max()))
         far = _rows(lattice, max(float(sites.perception.max()), float(sites.occupancy.max())))
         gone = self._cover(lattice)
-        cloud = self._cloud(lattice)
+        cloud = self._cloud(lattice, step)
         flags = marker_tiles.reached_tiles(
             lattice, entries.first, far, gone, not self._release and not len(self._points)
         )
@@ -234,7 +323,12 @@ class MarkerSpace:
             if self._cells[axis]:
                 low[axis] = 0.0
                 high[axis] = self._cells[axis] * self._cell[axis]
-        if len(self._envelopes.shape):
+        if self._explicit_alone:
+            if not len(self._points):
+                return None
+            low = np.maximum(low, self._points.min(axis=0))
+            high = np.minimum(high, self._points.max(axis=0))
+        elif len(self._envelopes.shape):
             half = 0.5 * self._envelopes.size
             floor = np.vstack((self._envelopes.centre - half, self._points)).min(axis=0)
             top = np.vstack((self._envelopes.centre + half, self._points)).max(axis=0)
@@ -272,13 +366,14 @@ class MarkerSpace:
             self._gone, self._gone_low = grown, new_low
         return Gone(self._gone, low - self._gone_low)
 
-    def _cloud(self, lattice: Lattice) -> Cloud:
-        """Sort the explicit markers by tile; those outside the box are left out."""
+    def _cloud(self, lattice: Lattice, step: int) -> Cloud:
+        """Sort the explicit markers by tile; those outside the box or due later are left out."""
         if not len(self._points):
             none = np.zeros(0, np.int64)
             return Cloud(self._points, none, none, self._cloud_gone)
         place = np.floor(self._points / (EDGE * self._cell)).astype(np.int64) - lattice.low
-        within = np.flatnonzero(np.all((place >= 0) & (place < lattice.shape), axis=1))
+        there = np.all((place >= 0) & (place < lattice.shape), axis=1) & (self._due <= step)
+        within = np.flatnonzero(there)
         nx, ny, nz = lattice.shape
         tile = (place[:, 2] * ny + place[:, 1]) * nx + place[:, 0]
         order = within[np.argsort(tile[within], kind="stable")]
@@ -308,6 +403,15 @@ def _sites(species: MarkerSpecies) -> Sites:
         cosine,
         np.sqrt(np.maximum(1.0 - cosine**2, 0.0)),
     )
+
+
+def _with_dormant(buds: Buds, sites: Sites, dormant: NDArray[np.bool_]) -> tuple[Buds, Sites]:
+    """Let dormant buds take markers but perceive none: each species has a blind one of its own."""
+    n = len(sites.occupancy)
+    species = (buds.species + np.where(dormant, n, 0)).astype(np.int16)
+    blind = Sites(sites.occupancy, np.zeros(n), np.ones(n), np.zeros(n))
+    both = Sites(*(np.concatenate(pair) for pair in zip(sites, blind, strict=True)))
+    return buds._replace(species=species), both
 
 
 def _with_standing(buds: Buds, sites: Sites, standing: StandingSites) -> tuple[Buds, Sites]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.environment.canopy import Canopy
+from forest.environment.dormant import Hold
 from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
 from forest.environment.marker_buds import BudSpace, apply_space
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
@@ -109,6 +110,7 @@ class Surroundings:
                 spec.markers.release,
                 [Envelope(e.shape, e.center_m, e.size_m) for e in spec.markers.envelope],
                 np.array(spec.markers.clouds, np.float64).reshape(-1, 3),
+                spec.markers.everywhere,
             )
             occupancy = internode * [s.shoots.occupancy_radius_internodes for s in species]
             self._marker_species = MarkerSpecies(
@@ -142,7 +144,12 @@ class Surroundings:
         return self._light.solid
 
     def expose(
-        self, metamers: Metamers, trees: Trees, step: int, others: PlantArea | None = None
+        self,
+        metamers: Metamers,
+        trees: Trees,
+        step: int,
+        others: PlantArea | None = None,
+        holds: Sequence[Hold] = (),
     ) -> None:
         """Tell every bud how much light and room it has in the given step.
 
@@ -152,6 +159,8 @@ class Surroundings:
         step : int
         others : PlantArea, optional
             What shades beside living trees, in the far field.
+        holds : sequence of Hold
+            What alone may grow of some trees (Palubicki et al. 2009, section 5).
         """
         standing = self.standing
         if self._rendered is not None:
@@ -163,7 +172,12 @@ class Surroundings:
             self._light.expose(metamers, trees, others, leaves)
         if self._markers is not None:
             space = self._markers.claim(
-                metamers, trees, self._marker_species, None if standing is None else standing.sites
+                metamers,
+                trees,
+                self._marker_species,
+                None if standing is None else standing.sites,
+                step=step,
+                holds=holds,
             )
             apply_space(metamers, trees, space)
             self._space = _by_serial(metamers, trees, space)
@@ -177,6 +191,11 @@ class Surroundings:
         serial = metamers.serial[trees.start[row] + shoots.metamer]
         wanted = _key(trees.tree_id[row], serial, shoots.bud)
         return direction[np.searchsorted(keys, wanted)]
+
+    @property
+    def markers(self) -> MarkerSpace | None:
+        """The marker space, where the scenario has one."""
+        return self._markers
 
     @property
     def canopy(self) -> Canopy | None:

@@ -74,6 +74,13 @@ def deal(size: NDArray[np.int32]) -> Deal:
     return Deal(*_deal(size.astype(np.int64), by_size, BINS))
 
 
+def leave_out(shared: Deal, rows: NDArray[np.int64]) -> Deal:
+    """Take some rows out of a deal; the others stay in their bins."""
+    kept = ~np.isin(shared.rows, rows)
+    before = np.concatenate((np.zeros(1, np.int64), np.cumsum(kept, dtype=np.int64)))
+    return Deal(shared.rows[kept], before[shared.first], shared.place)
+
+
 class Workbench:
     """Scratch memory that is kept from year to year and grows in place when trees do."""
 

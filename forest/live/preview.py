@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from forest.management.brushing import markers_of, outside
 from forest.management.plan import YearOfActs
 from forest.management.shaping import one_tree
 from forest.trees.skeleton import Skeleton, skeleton_of
@@ -27,3 +31,15 @@ def preview(stand: Stand, tree_id: int, plan: YearOfActs | None) -> Skeleton:
         pipe_exponent=float(stand.pipe_exponent[kind]),
         start_year=stand.scenario.start_year - 1,
     )
+
+
+def markers_to_come(stand: Stand, plan: YearOfActs | None) -> NDArray[np.float64]:
+    """Give the places of all markers that the strokes of a plan lay, float64 (n, 3), m."""
+    found = [np.zeros((0, 3))]
+    spec, around = stand.scenario.environment.markers, stand.surroundings
+    if plan is not None and spec is not None:
+        number = len(stand.strokes) + 1
+        for k, drawn in enumerate(plan.strokes.values()):
+            points, _ = markers_of(drawn, spec.spacing_m, stand.scenario.seed, number + k)
+            found.append(points[outside(around.solid, points, around.voxel_m)])
+    return np.concatenate(found)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from forest.errors import ActError, InputError
-from forest.live.preview import preview
+from forest.live.preview import markers_to_come, preview
 from forest.live.records import tables_of, write_run
 from forest.management.plan import YearOfActs, plan_year
 from forest.record.export import whole_file
@@ -16,11 +16,18 @@ from forest.scenario.timing import Timing
 from forest.stand import Stand
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
+    from numpy.typing import NDArray
 
     from forest.scenario import Scenario
+    from forest.scenario.model import Obstacle
     from forest.trees.skeleton import Skeleton
     from forest.yearbook import YearRecord
+
+
+#: How a session's file begins in which no year is grown: its `years` are one at least.
+NOT_YET = "# No year of this session is grown yet.\n"
 
 
 class LiveSession:
@@ -129,20 +136,33 @@ class LiveSession:
         self._pending = queued
         self._keep()
 
-    def undo(self) -> None:
-        """Take back the last act that waits for the next step.
+    def undo(self, number: int = -1) -> None:
+        """Take back an act that waits for the next step.
+
+        Parameters
+        ----------
+        number : int
+            Its place in `pending`; the last one if not given.
 
         Raises
         ------
         InputError
-            If none waits: what is done is done.
+            If none waits there: what is done is done; or if a later one needs it.
         """
-        if not self._pending:
+        if not -len(self._pending) <= number < len(self._pending):
             raise InputError(
                 "no act is pending", where="undo", expected="an act since the last step"
             )
-        self._become(self._with(self._pending[:-1]))
-        self._pending = self._pending[:-1]
+        left = list(self._pending)
+        del left[number]
+        before = self.stand.scenario
+        try:
+            self._become(self._with(left))
+            plan_year(self.stand, self.next_year)
+        except InputError as error:
+            self._become(before)
+            raise InputError(f"a later act needs it: {error}", where="undo") from None
+        self._pending = left
         self._keep()
 
     def step(self) -> YearRecord:
@@ -193,6 +213,35 @@ class LiveSession:
         """
         return preview(self.stand, tree_id, self._plan())
 
+    def bent(self, tree_id: int, metamer: int, to_m: Sequence[float]) -> Skeleton:
+        """The shape of a living tree as an act `bend` would leave it; nothing is queued.
+
+        Raises
+        ------
+        InputError
+            If it cannot be bent so.
+        """
+        keys = {"kind": "bend", "tree_id": tree_id, "metamer": metamer, "to_m": list(to_m)}
+        before = self.stand.scenario
+        try:
+            self._become(self._with([*self._pending, keys]))
+            return preview(self.stand, tree_id, plan_year(self.stand, self.next_year))
+        finally:
+            self._become(before)
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The obstacles as the acts that wait will leave them."""
+        plan = self._plan()
+        if plan is None or not plan.changes:
+            return self.stand.obstacles.now
+        return list(plan.changes.values())[-1].obstacles
+
+    @property
+    def markers_to_come(self) -> NDArray[np.float64]:
+        """Places (n, 3), m, of the markers that strokes that wait will lay, in all their steps."""
+        return markers_to_come(self.stand, self._plan())
+
     # ------------------------------------------------------------------ files
 
     def save(self, path: str | Path) -> None:
@@ -203,13 +252,19 @@ class LiveSession:
         OutputError
             If it cannot be written; what was there before stays.
         """
+        heading = "" if self._records else NOT_YET
         with (
             whole_file(path, overwrite=True) as draft,
             draft.open("w", encoding="utf-8") as file,
         ):
-            file.write(self.scenario.to_toml())
+            file.write(heading + self.scenario.to_toml())
             file.flush()
             os.fsync(file.fileno())
+
+    def keep_in(self, path: str | Path) -> None:
+        """Keep the session in a file from now on: written anew after each act and step."""
+        self._save_to = Path(path)
+        self._keep()
 
     def write_run(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a run file of the years so far: the tables of the headless run.

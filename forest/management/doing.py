@@ -12,6 +12,7 @@ from forest import establishment
 from forest.dynamics.snags import is_left
 from forest.errors import InputError, nearest
 from forest.management import shaping
+from forest.management.brushing import Drawn
 from forest.management.plan import Felling, Marked, Places, plan_year
 from forest.management.shaping import Change
 from forest.management.treatments import stand_now
@@ -52,6 +53,8 @@ def act(stand: Stand, traits: SpeciesTraits) -> None:
         measures = fell(stand, number, felling, measures)
     for number, places in plan.plantings.items():
         measures, _ = plant(stand, number, places, (0.0, 0.0), traits, measures)
+    for number, drawn in plan.strokes.items():
+        stroke(stand, number, drawn, measures)
 
 
 def cut(
@@ -207,6 +210,14 @@ def plant(
         after = stand_now(stand, measures)
     stand.treatments.note(act, "plant", before, after)
     return measures, ids
+
+
+def stroke(stand: Stand, act: int, drawn: Drawn, measures: TreeMeasures) -> int:
+    """Lay a stroke, see `cut` for parameters; give its number."""
+    number = stand.brush.lay(stand, drawn)
+    here = stand_now(stand, measures)
+    stand.treatments.note(act, "stroke", here, here)
+    return number
 
 
 def felling_by_hand(stand: Stand, tree_ids: Sequence[int], cause: str) -> Felling:

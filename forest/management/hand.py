@@ -11,6 +11,7 @@ import numpy as np
 from forest.dynamics.storms import BROKEN, STOOD
 from forest.errors import InputError
 from forest.management import doing
+from forest.management.brushing import draw
 from forest.management.plan import (
     Felling,
     Marked,
@@ -27,6 +28,7 @@ from forest.scenario.acts import Branches, Planted, Pruning, check_planted
 from forest.scenario.cuttings import Harvesting, Thinning, check_rule
 from forest.scenario.model import Regular
 from forest.scenario.shaping import Bending, Marking, ObstacleChange
+from forest.scenario.strokes import Stroking, check_stroke
 from forest.species.schema import Refusal
 from forest.species.text import input_error
 from forest.trees.pruning import choose_branches, find_cuts
@@ -395,6 +397,37 @@ class Hand:
         kappa = self._traits.of["branch_pipe"]
         doing.change_obstacle(stand, BY_HAND, found, kappa, stand.measure())
         return len(found.cuts)
+
+    def stroke(self, points_m: Any = (), radius_m: Any = 0.5, **stroke: Any) -> int:
+        """Lay markers along the path of a brush (Palubicki et al. 2009, section 5).
+
+        Parameters
+        ----------
+        points_m : array_like (n, 3)
+            The path, m.
+        radius_m : float or sequence of n floats
+            Radius of the brush: pen pressure.
+        **stroke
+            As in a scenario's act of kind `stroke`: `spacing_m` or `markers_m3`, `steps`,
+            `hold_steps`, `tree_id`, `metamer`, `bud`, `from_metamer`, `mirror`, `rotation`,
+            `tiling`. See `forest.scenario.strokes.Stroking`.
+
+        Returns
+        -------
+        int
+            Its number in `Stand.strokes`.
+
+        Raises
+        ------
+        InputError
+            If the stroke is not right, or there is no such tree, metamer or bud.
+        """
+        stand, where = cast("Stand", self), "Stand.stroke"
+        checked = Stroking.of(where, points_m=points_m, radius_m=radius_m, **stroke)
+        with _one_line(where):
+            check_stroke(checked, "", stand.scenario.environment)
+        drawn = draw(checked, stand, where + ": {}")
+        return doing.stroke(stand, BY_HAND, drawn, stand.measure())
 
 
 def _pattern(

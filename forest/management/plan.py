@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import ActError, InputError
+from forest.management.brushing import Drawn, draw
 from forest.management.filling import pattern_places
 from forest.management.selection import Mask, census_of, to_harvest, to_prune, to_thin
 from forest.management.shaping import Change, Cuts, cuts_inside, shape_to_come
@@ -19,6 +20,7 @@ from forest.scenario.acts import Act, Fell, Plant, Planted, Prune, Pruning
 from forest.scenario.choosing import ChosenTrees
 from forest.scenario.cuttings import Harvest, Thin
 from forest.scenario.shaping import Bend, Bending, ChangeObstacle, Mark, ObstacleChange
+from forest.scenario.strokes import Stroke
 from forest.species.schema import Refusal
 from forest.species.text import input_error
 from forest.trees.pruning import choose_branches, find_cuts
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 _TIMES = 1 << 14
 
 #: In which order the kinds of acts are done in a year; those that fell are not named.
-_ORDER = {"mark": 0, "obstacle": 1, "prune": 2, "bend": 3, "plant": 5}
+_ORDER = {"mark": 0, "obstacle": 1, "prune": 2, "bend": 3, "plant": 5, "stroke": 6}
 _FELLING = 4
 
 
@@ -70,7 +72,7 @@ class YearOfActs(NamedTuple):
     ----------
     measures : TreeMeasures
         Of the stand before them.
-    markings, changes, prunings, bendings, fellings, plantings : dict by number of the act
+    markings, changes, prunings, bendings, fellings, plantings, strokes : dict by number of the act
     triggers : list of int
         Acts that a trigger fired.
     """
@@ -82,6 +84,7 @@ class YearOfActs(NamedTuple):
     bendings: dict[int, Bending]
     fellings: dict[int, Felling]
     plantings: dict[int, Places]
+    strokes: dict[int, Drawn]
     triggers: list[int]
 
     def touched(self) -> Iterator[tuple[str, Iterable[int]]]:
@@ -112,8 +115,9 @@ class YearOfActs(NamedTuple):
 def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     """Find out what the acts of a year do to the stand as it is before that year.
 
-    First trees are marked, then obstacles change, it is pruned, bent, felled and planted, each kind
-    in the order of the file. Marks are given to the stand as it is before. A thinning
+    First trees are marked, then obstacles change, it is pruned, bent, felled and planted, then
+    strokes are laid, each kind in the order of the file. Marks are given to the stand as it is
+    before. A thinning
     or harvest sees what those before it leave; a pruning that chooses trees by rule, and a
     pattern of planting, see what all of them leave. Triggers see the stand before all acts.
     Nothing is changed here, so that a year is acted on wholly or not at all.
@@ -143,7 +147,7 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     if not due:
         return None
     triggers = [i for i, act in due if act.when is not None]
-    plan = YearOfActs(measures, {}, {}, {}, {}, {}, {}, triggers)
+    plan = YearOfActs(measures, {}, {}, {}, {}, {}, {}, {}, triggers)
     census = census_of(stand, measures)
     standing = np.ones(len(census.tree_id), np.bool_)
     first = stand.treatments.number + 1
@@ -152,7 +156,9 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
         try:
             if isinstance(act, Prune | Bend | ChangeObstacle):
                 continue
-            if isinstance(act, Mark):
+            if isinstance(act, Stroke):
+                plan.strokes[i] = draw(act, stand, f"acts[{i}].{{}} in {year}")
+            elif isinstance(act, Mark):
                 rows = chosen_rows(act, stand, census, standing, f"acts[{i}].{{}} in {year}", plan)
                 plan.markings[i] = Marked(act.mark, census.tree_id[rows].tolist())
             elif isinstance(act, Plant):

@@ -58,7 +58,7 @@ DEATH_CAUSES = (
 FELLING_CAUSES = ("thinning", "harvest", "tending")
 #: Events that change nothing in the number of trees.
 STAYING_KINDS = ("pruned", "marked", "bent")
-ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest", "mark", "bend", "obstacle")
+ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest", "mark", "bend", "obstacle", "stroke")
 STAGES = ("before", "after")
 RESIDUAL_STATUS = ("standing", "felled")
 

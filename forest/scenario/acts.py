@@ -15,6 +15,7 @@ from forest.scenario.model import PlantedTree, Plot
 from forest.scenario.placing import MOST_TREES, random_count
 from forest.scenario.regions import Region, check_region
 from forest.scenario.shaping import Bend, ChangeObstacle, Mark
+from forest.scenario.strokes import Stroke
 from forest.scenario.timing import Timing, check_timing
 from forest.species.schema import Refusal, Table, quantity, refusal
 
@@ -279,7 +280,7 @@ class Plant(Planted, Timing):
 
 
 Act = Annotated[
-    Prune | Fell | Plant | Thin | Harvest | Mark | Bend | ChangeObstacle,
+    Prune | Fell | Plant | Thin | Harvest | Mark | Bend | ChangeObstacle | Stroke,
     Field(discriminator="kind"),
 ]
 
@@ -352,16 +353,20 @@ def _check_room(act: Planted, start: str, plot: Plot) -> None:
 
 
 def _check_felled_once(acts: Sequence[Act], years: range) -> None:
-    """Refuse to do something to a tree that is gone; in one year felling comes last."""
+    """Refuse to do something to a tree that is gone.
+
+    In one year felling comes after all but strokes.
+    """
+    order = {"fell": 1, "stroke": 2}
     felled: dict[int, tuple[int, int]] = {}
     by_id = [
-        (year, act.kind == "fell", i, act)
+        (year, order.get(act.kind, 0), i, act)
         for i, act in enumerate(acts)
-        if act.when is None and isinstance(act, Prune | Fell | Mark | Bend)
+        if act.when is None and isinstance(act, Prune | Fell | Mark | Bend | Stroke)
         for year in act.calendar_years(years)
     ]
     for year, _, i, act in sorted(by_id, key=lambda entry: entry[:3]):
-        if isinstance(act, ChosenTrees):
+        if isinstance(act, ChosenTrees | Stroke):
             ids, key = act.ids, act.ids_key
         else:
             ids, key = (

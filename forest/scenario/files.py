@@ -17,6 +17,7 @@ from forest.species.text import read_bytes, read_text
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".vtp")
 _LIMIT_M = 1e5
+_BRUSH_M = (1e-3, 1000.0)
 
 
 def locate(file: str, context: Any) -> Path:
@@ -203,6 +204,22 @@ def read_cloud(file: str, context: Any) -> list[tuple[float, float, float]]:
         )
         for line, row in _rows(file, context, ("x_m", "y_m", "z_m"))
     ]
+
+
+def read_stroke(
+    file: str, context: Any
+) -> tuple[list[tuple[float, float, float]], list[float] | None]:
+    """Read the points of a brush's path, and its radii where there is a column radius_m."""
+    points = []
+    radii = []
+    for line, row in _rows(file, context, ("x_m", "y_m", "z_m")):
+        x, y, z = (_number(file, line, row, column) for column in ("x_m", "y_m", "z_m"))
+        points.append((x, y, z))
+        if "radius_m" in row:
+            radii.append(_number(file, line, row, "radius_m", _BRUSH_M))
+    if not points:
+        raise Refusal(f"{file!r} holds no point", expected="at least one row")
+    return points, radii or None
 
 
 def find_mesh(file: str, context: Any) -> str:

@@ -15,6 +15,7 @@ from forest.scenario.mortality import check_mortality
 from forest.scenario.regeneration import check_regeneration
 from forest.scenario.residual import check_felled_residual, check_residual
 from forest.scenario.shaping import check_shaping
+from forest.scenario.strokes import check_strokes
 from forest.scenario.wind import check_wind
 from forest.species.schema import Refusal
 
@@ -44,6 +45,7 @@ def check_fit(scenario: Scenario) -> None:
     shares = {name: use.share for name, use in scenario.species.items()}
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.planned_calendar, regular)
+    check_strokes(scenario.acts, scenario.environment)
     check_shaping(scenario.acts, scenario.obstacles)
     residual = scenario.residual_trees
     check_residual(

@@ -191,7 +191,16 @@ class Markers(Table):
         unit="",
     )
     envelope: tuple[Envelope, ...] = quantity(
-        (), "markers exist only inside these volumes; empty = everywhere", unit="", max_length=1000
+        (),
+        "procedural markers exist only inside these volumes; empty = as `everywhere` says",
+        unit="",
+        max_length=1000,
+    )
+    everywhere: bool = quantity(
+        True,
+        "without an envelope procedural markers are everywhere; false: there are only those "
+        "of envelopes, clouds and strokes",
+        unit="",
     )
     clouds: tuple[Point, ...] = quantity(
         (),

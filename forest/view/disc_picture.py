@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ _NOTED_OFFSET = 0.03  # share of the radius that the pith is off centre before i
 _DPI = 120
 
 
-def draw_disc(disc: Disc, to: str | Path, *, conifer: bool = True) -> None:
+def draw_disc(disc: Disc, to: str | Path | IO[bytes], *, conifer: bool = True) -> None:
     """Draw a disc as if planed, and save the picture.
 
     As on a wooden disc, one dot marks the ring of every tenth year, two that of every fiftieth,
@@ -42,8 +42,9 @@ def draw_disc(disc: Disc, to: str | Path, *, conifer: bool = True) -> None:
     Parameters
     ----------
     disc : Disc
-    to : path
-        File to write; its suffix, such as ``.png`` or ``.svg``, names the format.
+    to : path or open file
+        File to write; its suffix, such as ``.png`` or ``.svg``, names the format (.png if it is
+        open already).
     conifer : bool
         Whether to shade rings as of a conifer, which has much dark latewood.
     """

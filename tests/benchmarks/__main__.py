@@ -30,6 +30,7 @@ from tests.benchmarks import (
     scenes,
     stands,
     surfaces,
+    viewer,
 )
 
 
@@ -42,6 +43,7 @@ class Extent(NamedTuple):
     run: tuple[str, ...]  # changes to the hectare
     frame_trees: int  # of the stand view
     scene_across: int  # tiles along each edge of the scene
+    viewer_years: int  # of the hectare that is shown
     repeats: int  # of the paper's tree and of the warm start
 
 
@@ -52,6 +54,7 @@ FULL = Extent(
     run=(),
     frame_trees=10_000,
     scene_across=8,
+    viewer_years=25,
     repeats=3,
 )
 QUICK = Extent(
@@ -61,6 +64,7 @@ QUICK = Extent(
     run=("plot.size_m=[24, 24]", "years=30"),
     frame_trees=2_000,
     scene_across=3,
+    viewer_years=10,
     repeats=1,
 )
 
@@ -105,6 +109,9 @@ def measure(extent: Extent) -> dict[str, Any]:
     result["bark_maps"] = _say("4K set", machine.alone, bark_maps.measure_maps, extent.repeats)
     result["bark"] = _say("fracture bark", machine.alone, bark.measure_bark, extent.repeats)
     result["flow"] = _say("bark flow", machine.alone, flow.measure_flow, extent.repeats)
+    result["viewer"] = _say(
+        "a hectare in the viewer", machine.alone, viewer.measure_viewer, extent.viewer_years
+    )
     result["starts"] = _say("cold and warm start", runs.time_starts, extent.repeats)
     result["others_share"] = others.share()
     result["finished"] = datetime.now(UTC).isoformat(timespec="seconds")

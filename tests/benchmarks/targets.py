@@ -55,6 +55,12 @@ def verdicts(result: dict[str, Any]) -> Iterator[Verdict]:
     yield Verdict("the same, aim", timed["bend_ns"] / 1e3, "≤", 0.6)
     changed = timed["again_ns"] / timed["wall_ns"]["settle"]
     yield Verdict("settling where nothing has changed, of a year's", changed, "≤", 0.5)
+    viewer = result["viewer"]
+    yield Verdict("viewer: opening a hectare, s", viewer["open_s"], "≤", 10.0)
+    yield Verdict("viewer: another year, s", viewer["year_s"], "≤", 0.3)
+    yield Verdict("viewer: frames per second", 1.0 / viewer["frame_s"], "≥", 15.0)
+    if viewer["browser_fps"] == viewer["browser_fps"]:  # NaN without a browser
+        yield Verdict("viewer: the same in a browser", viewer["browser_fps"], "≥", 15.0)
     scene = result["scene"]
     if scene["hectares"] >= _SCENE_HECTARES:
         yield Verdict("scene of a hectare, s", scene["seconds"], "≤", 20.0)

@@ -1,0 +1,99 @@
+"""Pictures of `forest view` for its page in the docs: `python analysis/viewer_pictures.py RUN.h5`.
+
+It starts the viewer as a user does, opens its page in a headless Chromium and saves what is seen in
+docs/gallery.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+GALLERY = ROOT / "docs" / "gallery"
+_PATIENCE_MS = 240_000
+
+
+def shoot(page: Any, name: str) -> None:
+    """Save the page as a picture of the gallery, in few colours."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    page.mouse.move(4, 4)
+    page.wait_for_timeout(4000)
+    image = Image.open(BytesIO(page.screenshot())).convert("RGB")
+    image.quantize(256, kmeans=1, dither=Image.Dither.NONE).save(
+        GALLERY / f"{name}.png", optimize=True
+    )
+
+
+def tour(page: Any) -> None:
+    """Go through the views."""
+    page.wait_for_selector("#year", timeout=_PATIENCE_MS)
+    shoot(page, "viewer_stand")
+    page.click(".v-tab:has-text('Map')")
+    page.wait_for_selector("#plan svg")
+    page.click("#look-side")
+    page.click("#colour-by", force=True)
+    page.click(".v-list-item:has-text('Diameter')")
+    shoot(page, "viewer_map")
+    stems = page.locator("#plan g circle")
+    stem = stems.nth(stems.count() - 1).bounding_box()
+    page.mouse.click(stem["x"] + stem["width"] / 2, stem["y"] + stem["height"] / 2)
+    page.click(".v-tab:has-text('Tree')")
+    page.wait_for_selector("#card-title", timeout=_PATIENCE_MS)
+    page.click("#look-tree")
+    page.click("#cut")
+    page.wait_for_selector("#disc", timeout=_PATIENCE_MS)
+    page.locator("#disc").scroll_into_view_if_needed()
+    shoot(page, "viewer_tree")
+    page.click("#year")
+    page.keyboard.press("Escape")
+    page.click(".v-tab:has-text('Light')")
+    page.click("#look-stand")
+    page.click("#inside-slice")
+    page.wait_for_selector("#inside-off", timeout=_PATIENCE_MS)
+    shoot(page, "viewer_slice")
+    page.click("#inside-sun")
+    page.wait_for_selector("#light-view", timeout=_PATIENCE_MS)
+    shoot(page, "viewer_light")
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Take the pictures of a run."""
+    from playwright.sync_api import sync_playwright
+
+    if len(arguments) != 1:
+        sys.exit("usage: python analysis/viewer_pictures.py RUN.h5")
+    code = "from forest.cli import main; main()"
+    view = subprocess.Popen(
+        [sys.executable, "-c", code, "view", arguments[0], "--port", "0", "--no-browser"],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert view.stdout is not None
+        found = re.search(r"http://\S+", view.stdout.readline())
+        if found is None:
+            sys.exit("the viewer did not start")
+        with sync_playwright() as playwright:
+            path = shutil.which("chromium") or playwright.chromium.executable_path
+            browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+            page = browser.new_page(viewport={"width": 1280, "height": 780})
+            page.goto(found.group())
+            tour(page)
+            browser.close()
+    finally:
+        view.terminate()
+        view.wait()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,116 @@
+"""The command that shows a stand in the browser: `forest view`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def view(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN.h5|SCENARIO.toml",
+            help="A run file, finished or not; or a scenario, to grow it and work on it live.",
+        ),
+    ],
+    port: Annotated[
+        int | None,
+        typer.Option(help="Default: 8765, or the next one that is free. 0: any free one."),
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Name of this machine that is listened on: loopback names only.")
+    ] = "127.0.0.1",
+    browser: Annotated[bool, typer.Option(help="Whether to open the page in a browser.")] = True,
+    session: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.toml",
+            help="Of a scenario: where the session is kept, and taken up again; "
+            "default: the scenario's name.session.toml.",
+        ),
+    ] = None,
+) -> None:
+    """Show a stand in 3D in the browser: its years, its trees, their rings.
+
+    A scenario is grown live: run, pause, step; fell, prune, bend, plant, draw with the brush.
+    All that is done is kept in the session's file, a scenario that replays it to the same bits.
+
+    The page is served on this machine and to this machine alone. Ctrl-C ends it.
+
+    Examples:
+
+        forest view run.h5
+
+        forest view run.h5 --port 9000 --no-browser
+
+        forest view scenarios/shaped_tree.toml
+    """
+    from forest.errors import InputError
+    from forest.viewer.server import free_port, import_trame
+
+    live = file.suffix.lower() == ".toml"
+    if session is not None and not live:
+        raise InputError(f"--session is given with {file.name}", expected="a scenario (.toml)")
+    import_trame()
+    free = free_port(host, port)
+    if live:
+        _view_live(file, session or Path(f"{file.stem}.session.toml"), host, free, browser)
+    else:
+        _view_run(file, host, free, browser)
+    typer.echo("forest view: closed")
+
+
+def _view_run(file: Path, host: str, port: int, browser: bool) -> None:
+    from forest.record.run import open_run
+    from forest.viewer.app import App
+    from forest.viewer.source import RunSource
+
+    with open_run(file) as run:
+        app = App(RunSource(run))
+        _serve(app, host, port, _ready(file.name, browser))
+
+
+def _view_live(file: Path, session_file: Path, host: str, port: int, browser: bool) -> None:
+    from forest.errors import InputError
+    from forest.live import take_up
+    from forest.scenario import Scenario
+    from forest.viewer.app import App
+    from forest.viewer.live import LivePart
+    from forest.viewer.live_source import LiveSource
+
+    if session_file.resolve() == file.resolve():
+        raise InputError(
+            f"--session is {file.name} itself", expected="another file, or none for a new one"
+        )
+    scenario = Scenario.load(file)
+    session = take_up(scenario, session_file, say=lambda line: typer.echo(line, err=True))
+    part = LivePart()
+    app = App(LiveSource(session, str(session_file)), panels=(part.panel,))
+    done = f", {len(session.records)} years grown" if session.records else ""
+    replay = f"forest run {session_file} --out {session_file.stem}.h5"
+    try:
+        _serve(app, host, port, _ready(f"{file.name}{done}", browser))
+    finally:
+        part.desk.finish()
+    typer.echo(f"the session is kept in {session_file}; it is grown again by: {replay}")
+
+
+def _serve(app: Any, host: str, port: int, ready: Callable[[str], None]) -> None:
+    from forest.viewer.server import serve
+
+    serve(app.server, host=host, port=port, ready=ready)
+
+
+def _ready(what: str, browser: bool) -> Callable[[str], None]:
+    def ready(address: str) -> None:
+        typer.echo(f"{what} is shown at {address} (Ctrl-C ends it)")
+        if browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    return ready
