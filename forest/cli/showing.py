@@ -17,7 +17,9 @@ def view(
     host: Annotated[
         str, typer.Option(help="Name of this machine that is listened on: loopback names only.")
     ] = "127.0.0.1",
-    browser: Annotated[bool, typer.Option(help="Whether to open the page in a browser.")] = True,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only say where the page is.")
+    ] = False,
 ) -> None:
     """Show a stand in 3D in the browser: its years, its trees, their rings.
 
@@ -42,7 +44,7 @@ def view(
 
         def ready(address: str) -> None:
             typer.echo(f"{file.name} is shown at {address} (Ctrl-C ends it)")
-            if browser:
+            if not no_browser:
                 import webbrowser
 
                 webbrowser.open(address)
