@@ -15,6 +15,7 @@ import typer
 from forest.cli.barking import bark
 from forest.cli.describing import species, version
 from forest.cli.exporting import export
+from forest.cli.filming import movie
 from forest.cli.growing import check, run, sweep
 from forest.cli.measuring import bucking, measure
 from forest.cli.planting import tree
@@ -60,6 +61,7 @@ for _command in (
     species,
     picture,
     stand_view,
+    movie,
     scene,
     tree,
     version,

@@ -76,12 +76,9 @@ def draw_mesh(
         raise InputError("nothing to draw", where=str(to), expected="a mesh with triangles")
     plotter = open_plotter(window)
     plotter.set_background("white")
-    plotter.remove_all_lights()
-    plotter.add_light(import_pyvista().Light(position=light, light_type="scene light"))
+    light_from(plotter, light)
     if colour_by == TEXTURE:
-        for mesh, part in zip(meshes, parts, strict=True):
-            if len(mesh.triangles):
-                _add_textured(plotter, mesh, part.material)
+        add_textured(plotter, parts)
     else:
         _add_coloured(plotter, Mesh.together(meshes), colour_by)
     points = np.concatenate([mesh.points for mesh in meshes])
@@ -92,6 +89,20 @@ def draw_mesh(
     picture = Image.fromarray(pixels(plotter))
     with whole_file(to, overwrite=overwrite) as draft:
         picture.save(draft)
+
+
+def light_from(plotter: Any, direction: tuple[float, float, float] = LIGHT) -> None:
+    """Light a plotter from one direction alone."""
+    plotter.remove_all_lights()
+    plotter.add_light(import_pyvista().Light(position=direction, light_type="scene light"))
+
+
+def add_textured(plotter: Any, parts: Sequence[Part]) -> None:
+    """Put parts into a plotter as they look, each in its material."""
+    for part in parts:
+        mesh = part.placed()
+        if len(mesh.triangles):
+            _add_textured(plotter, mesh, part.material)
 
 
 def _add_coloured(plotter: Any, mesh: Mesh, colour_by: str) -> None:
