@@ -112,6 +112,34 @@ def movie(
     typer.echo(f"{to}: {count} frames, {count / settings.fps:.1f} s")
 
 
+def report(
+    run_file: RunFile,
+    to: Annotated[Path, typer.Option("--to", metavar="FILE.html", help="The page.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Write a run as one page of pictures, charts and tables, which opens from disk.
+
+    The page holds all it shows, and asks no other place for anything.
+
+    Example:
+
+        forest report run.h5 --to report.html
+    """
+    from rich.console import Console
+
+    from forest.record.run import open_run
+    from forest.view.report import write_report
+
+    check_targets((to, (".html",)), force=force)
+    with open_run(run_file) as run, Console(stderr=True).status("the report") as status:
+        warnings = write_report(
+            run, to, overwrite=force, say=lambda name: status.update(f"the report: {name}")
+        )
+    for warning in warnings:
+        typer.echo(warning, err=True)
+    typer.echo(f"{to}: {to.stat().st_size / 1e6:.1f} MB")
+
+
 def _settings(to: Path, fps: float | None, seconds: float | None, size: str) -> FilmSettings:
     from forest.cli.viewing import pixels_of
     from forest.errors import InputError

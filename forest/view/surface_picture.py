@@ -76,7 +76,8 @@ def draw_mesh(
         raise InputError("nothing to draw", where=str(to), expected="a mesh with triangles")
     plotter = open_plotter(window)
     plotter.set_background("white")
-    light_from(plotter, light)
+    plotter.remove_all_lights()
+    plotter.add_light(import_pyvista().Light(position=light, light_type="scene light"))
     if colour_by == TEXTURE:
         add_textured(plotter, parts)
     else:
@@ -89,12 +90,6 @@ def draw_mesh(
     picture = Image.fromarray(pixels(plotter))
     with whole_file(to, overwrite=overwrite) as draft:
         picture.save(draft)
-
-
-def light_from(plotter: Any, direction: tuple[float, float, float] = LIGHT) -> None:
-    """Light a plotter from one direction alone."""
-    plotter.remove_all_lights()
-    plotter.add_light(import_pyvista().Light(position=direction, light_type="scene light"))
 
 
 def add_textured(plotter: Any, parts: Sequence[Part]) -> None:

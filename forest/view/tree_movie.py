@@ -18,8 +18,8 @@ from forest.trees.skeleton import Skeleton
 from forest.view.film import check_film, write_film
 from forest.view.movie import FilmSettings
 from forest.view.overlay import font
-from forest.view.scene import Scene, look_at, open_plotter, shoot
-from forest.view.surface_picture import add_textured, light_from
+from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, shoot
+from forest.view.surface_picture import add_textured
 from forest.view.tree_mesh import species_of, too_thin, tree_parts
 
 #: How a tree is drawn: as its internodes, or as one surface (`forest.surface`).
@@ -27,11 +27,14 @@ SHAPES = ("skeleton", "mesh")
 
 _SECONDS_AROUND = 8.0
 _SECONDS_PER_YEAR = 0.3
+_GROWING = 0.85  # share of the film in which a tree grows up; then its last year stays
 _ABOVE_DEG = 6.0
 _BEARING_DEG = -75.0
 _LEAST_WIDTH = 0.0007  # radius of the thinnest wood, as a share of the tree's height
 _TEXT = 0.034  # height of letters, as a share of the frame's
 _INK = (30, 34, 30)
+_BEHIND = (0.84, 0.88, 0.90)  # pale bark must be seen
+_LAMP = (-0.5, 0.6, 1.0)
 
 
 def film_tree(
@@ -88,19 +91,24 @@ def film_tree(
     check_film(to, settings.size)
     if shape not in SHAPES:
         raise InputError(f"no shape '{shape}', {nearest(shape, SHAPES)}")
-    years = run.sample_years(tree_id) if tree_id in run.samples else np.empty(0, np.int32)
-    last = year if year is not None or not len(years) else int(years[-1])
-    whole = run.skeleton(tree_id, int(last or 0))  # refuses a tree or a year not on record
-    shown = years[years <= last] if grow else np.array([last])
-    usual = max(_SECONDS_AROUND, _SECONDS_PER_YEAR * len(shown) if grow else 0.0)
+    recorded = run.sample_years(tree_id).tolist() if tree_id in run.samples else []
+    last = (recorded or [0])[-1] if year is None else year
+    whole = run.skeleton(tree_id, last)  # refuses a tree or a year that is not on record
+    if grow and len(recorded) < 2:
+        raise InputError(
+            f"tree {tree_id} is on record in {last} alone",
+            where=str(run.path),
+            expected="a tree of output.sample_trees.ids, whose whole life is on record",
+        )
+    shown = [y for y in recorded if y <= last] if grow else [last]
+    usual = max(_SECONDS_AROUND, _SECONDS_PER_YEAR * len(shown))
     count = settings.count(usual)
-    at = shown[
-        np.minimum(np.arange(count) * len(shown) // max(1, round(0.85 * count)), len(shown) - 1)
-    ]
+    growing = max(1, round(_GROWING * count))
+    at = [shown[min(k * len(shown) // growing, len(shown) - 1)] for k in range(count)]
     stage = _TreeStage(run, whole, settings.size, shape, leaves)
 
     def frame(k: int) -> NDArray[np.uint8]:
-        return stage.picture(int(at[k]), k / count)
+        return stage.picture(at[k], k / count)
 
     begin(count)
     try:
@@ -111,7 +119,7 @@ def film_tree(
 
 
 class _TreeStage:
-    """A tree on white, of one year at a time, seen from all sides from the same distance."""
+    """A tree of one year at a time, seen from all sides from the same distance."""
 
     def __init__(
         self, run: Run, whole: Skeleton, window: tuple[int, int], shape: str, leaves: bool
@@ -152,12 +160,14 @@ class _TreeStage:
     def _put_up(self, year: int) -> None:
         self.close()
         self._plotter, self._shown, self._year = open_plotter(self.window), False, year
-        self._plotter.set_background("white")
+        self._plotter.set_background(_BEHIND)
         skeleton = self.run.skeleton(self.tree_id, year)
         if self.shape == "skeleton":
             Scene([skeleton], leaves=self.leaves, least_radius_m=self.thin).add_to(self._plotter)
             return
-        light_from(self._plotter)
+        self._plotter.remove_all_lights()
+        lamp = import_pyvista().Light(position=_LAMP, light_type="camera light")
+        self._plotter.add_light(lamp)  # goes around with the eye
         species = species_of(self.run, skeleton)
         wood = tubes(skeleton) if too_thin(skeleton) else blended(skeleton)
         cards = leaves_of(skeleton, species) if self.leaves else None
