@@ -197,20 +197,24 @@ def said(column: str) -> str:
 
 
 def curves(
-    frame: pd.DataFrame, columns: Mapping[str, str], title: str, *, zero: bool = True
+    frame: pd.DataFrame,
+    columns: Mapping[str, str],
+    title: str,
+    *,
+    colours: Mapping[str, Any] | None = None,
+    size: tuple[float, float] = _SIZE,
 ) -> Picture:
     """Draw columns of one row per year as curves; `columns` names them."""
     from matplotlib import colormaps
 
     def paint(axes: Any) -> None:
         for k, (column, label) in enumerate(columns.items()):
-            axes.plot(
-                frame["year"], frame[column], color=colormaps["tab10"](k), lw=1.4, label=label
-            )
-        if zero:
+            colour = colours[column] if colours else colormaps["tab10"](k)
+            axes.plot(frame["year"], frame[column], color=colour, lw=1.4, label=label)
+        if (frame[list(columns)] < 0.0).any(axis=None):
             axes.axhline(0.0, color="0.6", lw=0.6)
         if len(columns) > 1:
             axes.legend(fontsize=_WORDS - 1, frameon=False)
 
     courses = (_course(label, frame["year"], frame[name]) for name, label in columns.items())
-    return chart(paint, title=title, alt=f"{title}. {'; '.join(courses)}")
+    return chart(paint, title=title, alt=f"{title}. {'; '.join(courses)}", size=size)

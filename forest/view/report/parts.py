@@ -50,10 +50,9 @@ def figure(picture: Picture) -> str:
     return f"<figure>{image}{caption}</figure>"
 
 
-def gallery(pictures: Iterable[Picture], *, wide: bool = False) -> str:
-    """Write pictures side by side."""
-    name = "gallery wide" if wide else "gallery"
-    return f'<div class="{name}">{"".join(map(figure, pictures))}</div>'
+def gallery(pictures: Iterable[Picture], *, name: str = "") -> str:
+    """Write pictures side by side; the name says how large they are."""
+    return f'<div class="gallery {name}">{"".join(map(figure, pictures))}</div>'
 
 
 def table(

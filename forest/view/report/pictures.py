@@ -27,14 +27,18 @@ _MAP = (440, 440)
 _TREE = (300, 420)
 _DISC_PX = 420
 _DISC_M = 1.3
-_COLOURS = 128  # of a picture's palette: a third of the bytes
+_COLOURS = 255  # of a picture's palette: a third of the bytes
 
 _Image = Any
 
 
-def _png(picture: _Image, colours: int = _COLOURS) -> bytes:
+def _png(picture: _Image) -> bytes:
+    """Write a picture in a palette that has the colours of small trees too."""
+    from PIL import Image
+
     to = BytesIO()
-    picture.convert("RGB").quantize(colours, dither=0).save(to, format="PNG", optimize=True)
+    few = picture.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
+    few.save(to, format="PNG", optimize=True)
     return to.getvalue()
 
 
@@ -118,5 +122,5 @@ def disc_picture(run: Run, tree_id: int, year: int) -> Picture | None:
         data = _from_file(to, _DISC_PX)
     rings = int(np.count_nonzero(disc.ring_widths))
     thick = 200.0 * (disc.radius + disc.bark_thickness)
-    alt = f"Disc of tree {tree_id} at {_DISC_M:g} m: {rings} rings, {thick:.1f} cm over bark"
-    return Picture(data, "png", alt, f"disc at {_DISC_M:g} m")
+    told = f"disc at {_DISC_M:g} m: {rings} rings, {thick:.1f} cm over bark"
+    return Picture(data, "png", f"Tree {tree_id}, {told}", told)

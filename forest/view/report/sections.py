@@ -9,6 +9,7 @@ import numpy as np
 
 from forest.record.export import info
 from forest.record.run import Run
+from forest.view.looks import look_of
 from forest.view.report import charts
 from forest.view.report.parts import Picture, Section, gallery, number, pairs, table, text
 from forest.view.report.pictures import (
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _ALL = "all"
 _MOST_ROWS = 25
 _MOST_SAMPLES = 6
+_SMALL = (3.3, 2.7)  # of a tree's charts
 
 #: Columns of `/stand` in the stand table: heading, digits.
 STAND_COLUMNS = {
@@ -79,8 +81,8 @@ def stand_section(run: Run) -> Section | None:
         if i in (0, last) or (int(str(i)) + 1) % every == 0
     )
     headings = ["year", *(heading for heading, _ in STAND_COLUMNS.values())]
-    steps = "every year" if every == 1 else f"the first, every {every}th and the last year"
-    caption = f"The stand at the end of {steps}; died and felled in that year"
+    steps = "of every year" if every == 1 else f"every {every} years"
+    caption = f"The stand at the end {steps}; died and felled are of the year alone"
     return Section("Stand table", table(headings, rows, caption=caption, name="stand-table"))
 
 
@@ -111,7 +113,7 @@ def picture_section(run: Run) -> Section | None:
         "Stems as cones and crowns as simple shapes of their measured size, coloured by species. "
         f"The plot is {width:g} × {depth:g} m; in the map north (y) is up."
     )
-    body = f'{text(told)}<ul class="key">{key}</ul>{gallery(side, wide=True)}{gallery(above)}'
+    body = f'{text(told)}<ul class="key">{key}</ul>{gallery(side)}{gallery(above, name="maps")}'
     return Section("The stand in pictures", body)
 
 
@@ -213,9 +215,15 @@ def _climate(climate: pd.DataFrame) -> list[Picture]:
         index="year", columns="species", values="factor"
     )
     if np.nanstd(factors.to_numpy()) > 0.0:
-        names = {str(name): str(name).replace("_", " ") for name in factors}
+        apart = float(np.ptp(factors.to_numpy(), axis=1).max()) > 0.0
+        names = {
+            str(name): str(name).replace("_", " ") if apart else "all species"
+            for name in (factors if apart else factors.columns[:1])
+        }
         title = "Climate: factor on each species' income"
-        drawn.append(charts.curves(factors.reset_index(), names, title, zero=False))
+        colours = {name: look_of(name).line for name in names}
+        frame = factors.reset_index()
+        drawn.append(charts.curves(frame, names, title, colours=colours))
     first = climate.drop_duplicates("year")
     for column, title in (
         ("temperature_c", "Mean annual temperature, °C"),
@@ -223,7 +231,7 @@ def _climate(climate: pd.DataFrame) -> list[Picture]:
         ("drought_index", "Drought index; below 0 dry"),
     ):
         if first[column].notna().any():
-            drawn.append(charts.curves(first, {column: title}, title, zero=False))
+            drawn.append(charts.curves(first, {column: title}, title))
     return drawn
 
 
@@ -245,10 +253,11 @@ def sample_section(run: Run) -> Section | None:
         if len(mine) > 1:
             for column, title in (("height_m", "Height, m"), ("dbh_cm", "Dbh, cm")):
                 if mine[column].notna().any():
-                    drawn.append(charts.curves(mine, {column: title}, f"{title}, tree {tree_id}"))
+                    name = f"{title}, tree {tree_id}"
+                    drawn.append(charts.curves(mine, {column: title}, name, size=_SMALL))
         cards.append(
             f'<div class="card" id="tree-{tree_id}"><h3>Tree {tree_id}</h3>'
-            f"{pairs(lines)}{gallery(drawn)}</div>"
+            f"{pairs(lines)}{gallery(drawn, name='tree')}</div>"
         )
     note = ""
     if len(run.samples) > len(chosen):
