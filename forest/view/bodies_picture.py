@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,8 @@ _PLOT, _SHADE = (0.83, 0.81, 0.71), (0.66, 0.65, 0.57)
 _BEARING_DEG, _ABOVE_DEG = -58.0, 20.0
 _LEAST_HEIGHT_M = 2.0  # of the space that is in view
 _MARGIN = 1.12
-_WITHIN = 0.65  # brightness low in a crown, of that at its top
+_SUN, _SKY, _FLOOR = 0.62, 0.30, 0.24  # what of its colour a surface shows by each light
+_WITHIN = 0.7  # brightness low in a crown, of that at its top
 
 
 class Stage:
@@ -70,11 +70,6 @@ class Stage:
         self._shown = False
         self._plotter = open_plotter(window)
         self._plotter.set_background(AROUND)
-        self._plotter.remove_all_lights()
-        pv = import_pyvista()
-        sun = pv.Light(position=tuple(SUN), light_type="scene light", intensity=0.75)
-        self._plotter.add_light(sun)
-        self._plotter.add_light(pv.Light(light_type="headlight", intensity=0.25))
         self._add_ground()
 
     def picture(
@@ -123,7 +118,7 @@ class Stage:
     def _add_ground(self) -> None:
         pv = import_pyvista()
         width, depth = self.size_m
-        plane = pv.Plane((0.5 * width, 0.5 * depth, -0.02), i_size=width, j_size=depth)
+        plane = pv.Plane(center=(0.5 * width, 0.5 * depth, -0.02), i_size=width, j_size=depth)
         self._plotter.add_mesh(plane, color=_PLOT, lighting=False)
         corners = np.array([(0, 0), (width, 0), (width, depth), (0, depth), (0, 0)], float)
         outline = pv.lines_from_points(np.column_stack((corners, np.full(5, 0.03))))
@@ -146,19 +141,9 @@ class Stage:
         mesh = mesh.compute_normals(
             cell_normals=False, split_vertices=False, consistent_normals=False
         )
-        mesh.point_data["rgb"] = np.asarray(255.0 * np.clip(rgb, 0.0, 1.0), np.uint8)
-        actor = self._plotter.add_mesh(
-            mesh,
-            name="bodies",
-            scalars="rgb",
-            rgb=True,
-            ambient=0.45,
-            diffuse=0.75,
-            specular=0.0,
-            reset_camera=False,
-            render=False,
-        )
-        actor.prop.interpolation = "gouraud"
+        lit = _lit(np.asarray(mesh.point_data["Normals"], np.float64))
+        mesh.point_data["rgb"] = np.asarray(255.0 * np.clip(rgb * lit[:, None], 0.0, 1.0), np.uint8)
+        self._put("bodies", mesh, scalars="rgb", rgb=True)
 
     def _add_shadows(self, bodies: Bodies) -> None:
         """Lay every body flat on the ground, away from the sun."""
@@ -167,8 +152,18 @@ class Stage:
             return
         flat = bodies.points - bodies.points[:, 2:] * (SUN / SUN[2]).astype(np.float32)
         mesh = import_pyvista().PolyData.from_regular_faces(flat, bodies.triangles)
+        self._put("shadows", mesh, color=_SHADE)
+
+    def _put(self, name: str, mesh: Any, **look: Any) -> None:
+        """Add closed bodies in colours that are lit already: one pass, and only front sides."""
         self._plotter.add_mesh(
-            mesh, name="shadows", color=_SHADE, lighting=False, reset_camera=False, render=False
+            mesh,
+            name=name,
+            lighting=False,
+            culling="back",
+            reset_camera=False,
+            render=False,
+            **look,
         )
 
     def _look(self, turn: float) -> None:
@@ -200,31 +195,8 @@ class Stage:
         )
 
 
-def draw_bodies(
-    trees: pd.DataFrame,
-    size_m: tuple[float, float],
-    colours: TreeColours,
-    to: str | Path,
-    *,
-    window: tuple[int, int] = (960, 600),
-    view: str = "side",
-    conifers: Collection[str] = (),
-    height_m: float | None = None,
-) -> None:
-    """Draw one picture of trees as bodies and save it as a PNG.
-
-    Parameters
-    ----------
-    trees, size_m, colours, window, view, conifers
-        See `Stage`.
-    to : path
-        The file.
-    height_m : float, optional
-        Height of what is in view; the trees' if not given.
-    """
-    from PIL import Image
-
-    if height_m is None:
-        height_m = float(trees["height_m"].max()) if len(trees) else 0.0
-    with Stage(size_m, height_m, window=window, view=view, conifers=conifers) as stage:
-        Image.fromarray(stage.picture(trees, colours)).save(to, format="PNG", optimize=True)
+def _lit(normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Light of sun and sky on surfaces of these normals (n, 3)."""
+    sun = np.maximum(normals @ (SUN / np.linalg.norm(SUN)), 0.0)
+    sky = 0.5 + 0.5 * normals[:, 2]
+    return np.asarray(_SUN * sun + _SKY * sky + _FLOOR)

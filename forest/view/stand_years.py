@@ -38,13 +38,15 @@ _SIZES = (
     "lean_deg",
     "light",
 )
+_RESIDUAL_CONIFERS = ("balsam_fir",)
 #: How a tree goes, as the events' kinds name it.
 FATES = ("died", "felled", "windthrown")
 
 
 def conifers_of(run: Run) -> frozenset[str]:
-    """Name the conifers among a run's species."""
-    return frozenset(s.name for s in run.scenario.species_list if s.group == "conifer")
+    """Name the conifers among a run's species, and among those of residual trees."""
+    grown = (s.name for s in run.scenario.species_list if s.group == "conifer")
+    return frozenset((*grown, *_RESIDUAL_CONIFERS))
 
 
 class StandYears:
@@ -74,6 +76,7 @@ class StandYears:
         self.first, self.last = int(run.years[0]), int(run.years[-1])
         self.living = lru_cache(maxsize=3)(self._living)
         self.gone = lru_cache(maxsize=2)(self._gone)
+        self.residual = lru_cache(maxsize=2)(self._residual)
 
     def check_year(self, year: int | None, option: str, usual: int) -> int:
         """Give the year, the usual one if none is given; refuse one that is not on file."""
@@ -107,6 +110,15 @@ class StandYears:
             fate = dict(zip(events["tree_id"], events["kind"].astype(str), strict=True))
         return gone.assign(fate=[fate.get(int(tree_id), "died") for tree_id in gone["tree_id"]])
 
+    def _residual(self, year: int) -> pd.DataFrame:
+        """Rows of the residual trees that stand, in the columns of the others."""
+        if "residual" not in self.run.tables:
+            return self.living(year).iloc[:0].assign(fate="")
+        rows = self.run.read("residual", years=(year, year))
+        rows = rows[rows["status"] == "standing"].reset_index(drop=True)
+        rows = rows.assign(tree_id=-rows["residual_id"], status="living", age=0, fate="")
+        return rows.reindex(columns=[*COLUMNS, "fate"])
+
     def at(self, moment: float, since: float) -> pd.DataFrame:
         """Give the trees at a moment between the ends of two years.
 
@@ -120,7 +132,8 @@ class StandYears:
         Returns
         -------
         DataFrame
-            `COLUMNS` and `fate`: empty for the living, else one of `FATES`.
+            `COLUMNS` and `fate`: empty for the living, else one of `FATES`. Residual trees that
+            stand at the end of the year come last, with numbers below 0.
         """
         import pandas as pd
 
@@ -130,10 +143,11 @@ class StandYears:
         if share < 1.0 and year > self.first:
             trees = _between(self.living(year - 1), trees, share)
         gone = [self.gone(y) for y in range(max(int(np.floor(since)), self.first) + 1, year + 1)]
-        gone = [rows for rows in gone if len(rows)]
-        if not gone:
+        more = [rows for rows in (*gone, self.residual(year)) if len(rows)]
+        if not more:
             return trees
-        return pd.concat([trees, *gone], ignore_index=True)
+        parts = [rows.astype({"species": object}) for rows in (trees, *more)]
+        return pd.concat(parts, ignore_index=True)
 
 
 def _between(before: pd.DataFrame, now: pd.DataFrame, share: float) -> pd.DataFrame:

@@ -74,7 +74,8 @@ def stand_pictures(run: Run) -> tuple[list[Picture], list[Picture]]:
         with Stage(size_m, tall, window=window, view=view, conifers=conifers_of(run)) as stage:
             for year, trees in frames.items():
                 image = Image.fromarray(stage.picture(trees, colours))
-                counts = trees["species"].astype(str).value_counts()
+                grown = trees[trees["tree_id"] > 0]
+                counts = grown["species"].astype(str).value_counts()
                 of = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in counts.items() if n)
                 where = "from the side" if view == "side" else "from above"
                 pictures.append(
@@ -82,7 +83,7 @@ def stand_pictures(run: Run) -> tuple[list[Picture], list[Picture]]:
                         _png(image),
                         "png",
                         f"The stand {where} at the end of {year}: {of or 'no trees'}",
-                        f"{year}: {len(trees)} trees",
+                        f"{year}: {len(grown)} trees",
                     )
                 )
         made.append(pictures)

@@ -81,8 +81,8 @@ def stand_section(run: Run) -> Section | None:
         if i in (0, last) or (int(str(i)) + 1) % every == 0
     )
     headings = ["year", *(heading for heading, _ in STAND_COLUMNS.values())]
-    steps = "of every year" if every == 1 else f"every {every} years"
-    caption = f"The stand at the end {steps}; died and felled are of the year alone"
+    chosen = "" if every == 1 else f" (the first, the last, one in {every} between)"
+    caption = f"The stand at the end of the years{chosen}; died and felled are of the year alone"
     return Section("Stand table", table(headings, rows, caption=caption, name="stand-table"))
 
 
@@ -274,7 +274,7 @@ def _value(value: object) -> str:
 
 def provenance_section(run: Run) -> Section:
     """Say what made the run, and give the scenario."""
-    lines = info(run)
+    lines = [("file", run.path.name), *info(run)[1:]]  # not where it lies
     versions = run.provenance["sessions"][-1]["software"]
     lines.append(("versions", ", ".join(f"{name} {version}" for name, version in versions.items())))
     scenario = (
