@@ -48,6 +48,11 @@ class OutputError(InputError):
         return cls(f"cannot be written: {reason[:1].lower()}{reason[1:]}", where=str(path))
 
 
+def span_of(first: int, last: int) -> str:
+    """Say which years there are."""
+    return f"a year from {first} to {last}" if first != last else f"{first}, the only year"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Give a hint that names the known word closest to `name`, or list the known words."""
     choices = sorted(known)

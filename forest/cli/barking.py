@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forest.cli.shared import check_targets
-from forest.cli.surfacing import MESH, check_sample, working
+from forest.cli.shared import check_targets, endings, given_options
+from forest.cli.surfacing import MESH, check_metres, check_sample, working
 
 if TYPE_CHECKING:
     from forest.record.wood import YearlyWood
@@ -23,8 +23,13 @@ _BREAST_HEIGHT_M = 1.3
 _PARAMETRIC_AGE = 30.0  # years; a parametric tree has none
 _FEW_M = 2.0  # of the trunk that a picture shows
 
+# Options that a tile, and flow bark, know of.
+_OF_FLOW = ("--to", "--tree", "--parametric", "--year", "--preset", "--seed", "--model", "--force")
+_OF_TILE = (*_OF_FLOW, "--tile", "--size")
+
 
 def bark(
+    context: typer.Context,
     run_file: Annotated[
         Path | None, typer.Argument(metavar="RUN.h5", help="A run file, finished or not.")
     ] = None,
@@ -93,8 +98,9 @@ def bark(
 
         forest bark --parametric quaking_aspen --to aspen.glb
     """
-    from forest.errors import InputError
+    from forest.errors import InputError, nearest
     from forest.surface.bark.presets import Preset, preset_names
+    from forest.surface.bark.tree_bark import LAWS
     from forest.surface.bark.usual import usual_preset
 
     if list_:
@@ -106,9 +112,21 @@ def bark(
         raise InputError("nothing to write", where="--to", expected="a folder, a mesh or a .png")
     choices = _Choices(to, size, low, height, cell, kind, film, tile, force)
     choices.check()
+    check_metres("--least-radius", least_radius)
+    if law not in LAWS:
+        raise InputError(f"unknown law '{law}', {nearest(law, LAWS)}", where="--law")
     if model not in ("fracture", "flow") or (model == "flow" and to.suffix.lower() not in MESH):
         raise InputError(f"--model {model}", expected="fracture, or flow with --to NAME.glb")
+    given = given_options(context)
+    for asked, what, fitting in (
+        (model == "flow", "--model flow", _OF_FLOW),
+        (tile, "--tile", _OF_TILE),
+    ):
+        idle = [option for option in given if option not in fitting]
+        if asked and idle:
+            raise InputError(f"{idle[0]} does not go with {what}", expected="one of the two")
     chosen = _tree(run_file, tree, parametric, year, seed)
+    choices.check_years(None if shrink else chosen.wood)
     if model == "flow":
         _write_flow(chosen, preset, year, seed, choices)
         return
@@ -185,28 +203,50 @@ class _Choices:
     def check(self) -> None:
         """Refuse what cannot be, before anything is grown."""
         from forest.errors import InputError, OutputError, nearest
+        from forest.record.export import check_folder
 
         if self.size not in _SIZES:
             raise InputError(f"--size {self.size}", expected=" or ".join(map(str, _SIZES)))
         if self.kind not in ("tubes", "blended"):
             hint = nearest(self.kind, ("tubes", "blended"))
-            raise InputError(f"unknown kind '{self.kind}'", where="--kind", expected=hint)
-        if self.height is not None and self.height <= 0.0:
-            raise InputError(f"--height {self.height:g}", expected="metres, above 0")
+            raise InputError(f"unknown kind '{self.kind}', {hint}", where="--kind")
+        check_metres("--from", self.low, least_too=True)
+        check_metres("--height", self.height)
+        check_metres("--cell", self.cell)
         if self.film is not None and (self.suffix != ".png" or not self.years):
             raise InputError("--film draws years", expected="--to NAME.png --film 1960,1980")
         if self.cell is not None and self.suffix not in MESH:
             raise InputError("--cell is for a mesh", expected=f"a name that ends in {MESH[0]}")
         if self.tile and self.suffix:
             raise InputError("--tile gives maps", where=str(self.to), expected="a folder")
+        if self.suffix and self.suffix not in (*MESH, ".png"):
+            expected = f"a folder, or {endings((*MESH, '.png'))}"
+            raise InputError(
+                f"unknown format '{self.suffix}'", where=str(self.to), expected=expected
+            )
         if self.suffix:
             check_targets((self.to, (*MESH, ".png")), force=self.force)
-        elif self.to.is_dir() and any(self.to.iterdir()) and not self.force:
+            return
+        check_folder(self.to.parent, where=self.to)
+        if self.to.is_dir() and any(self.to.iterdir()) and not self.force:
             raise InputError(
                 "is not empty", where=str(self.to), expected="a new folder, or --force"
             )
         elif self.to.exists() and not self.to.is_dir():
             raise OutputError("is a file", where=str(self.to), expected="a folder")
+
+    def check_years(self, wood: YearlyWood | None) -> None:
+        """Refuse a film of years in which the tree was not, before bark is grown."""
+        from forest.errors import InputError, span_of
+
+        if self.film is None:
+            return
+        if wood is None:
+            raise InputError("--film needs a tree with a history", expected="a run's, no --shrink")
+        first, last = int(wood.years[0]), int(wood.years[-1])
+        for year in self.years:
+            if not first <= year <= last:
+                raise InputError(f"no year {year:g}", where="--film", expected=span_of(first, last))
 
 
 @dataclass(frozen=True)
@@ -315,18 +355,21 @@ def _write_flow(
 
 def _write_maps(grown: TreeBark, choices: _Choices) -> None:
     """Write a folder for each axis."""
+    from forest.record.export import whole_folder
+
     low, high = choices.part
     trunk = grown.tree.paths[0].axis
     axes = grown.axes if low is None else (trunk,)
-    with working(f"maps of {len(axes)} axes"):
+    with working(f"maps of {len(axes)} axes"), whole_folder(choices.to) as draft:
         for axis, maps in grown.maps(choices.size, axes=axes, low_m=low, high_m=high).items():
-            maps.save(choices.to / ("trunk" if axis == trunk else f"branch_{axis}"))
+            maps.save(draft / ("trunk" if axis == trunk else f"branch_{axis}"))
 
 
 def _write_tile(skeleton: Skeleton, preset: Preset, seed: int, choices: _Choices) -> None:
     """Write a tile of the bark at breast height."""
     import numpy as np
 
+    from forest.record.export import whole_folder
     from forest.surface.bark.dressing import grow_preset
     from forest.surface.bark.maps import bark_maps
 
@@ -334,7 +377,7 @@ def _write_tile(skeleton: Skeleton, preset: Preset, seed: int, choices: _Choices
     tall = skeleton.end[trunk, 2] - skeleton.start[0, 2] >= _BREAST_HEIGHT_M
     row = trunk[int(np.argmax(tall))] if tall.any() else trunk[0]
     girth = 2.0 * np.pi * float(skeleton.radius[row])
-    with working(f"a tile of {preset.name} bark"):
+    with working(f"a tile of {preset.name} bark"), whole_folder(choices.to) as draft:
         maps = bark_maps(grow_preset(preset, girth, seed=seed), preset, choices.size, seed=seed)
-        maps.save(choices.to)
+        maps.save(draft)
     typer.echo(f"{choices.to}: a tile of {preset.name} bark, {girth:.2f} m around")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from forest.cli.shared import RunFile
+from forest.cli.shared import FRAME, RunFile, check_targets
 
 # What --as may name: the function of forest.interop that makes it.
 _TABLES = {
@@ -57,6 +57,7 @@ def export(
         forest export run.h5 --tree 12 --year 2060 --as treeqsm --to cylinder_12.txt
     """
     from forest.errors import InputError
+    from forest.record.export import check_target
     from forest.record.run import open_run
 
     asked = {"--table": table, "--tree": tree, "--residual": residual}
@@ -67,6 +68,10 @@ def export(
     if tree is None and year is not None:
         expected = "a table with all its years" if table else "a shape that stays as it is"
         raise InputError("--year goes with --tree", expected=expected)
+    if table is not None and form is None:
+        check_targets((to, FRAME), force=force)
+    else:
+        check_target(to, overwrite=force, or_else=", or --force")
     with open_run(run_file) as run:
         if tree is not None:
             _export_tree(run, tree, year, form, to, force)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from forest.cli.shared import RunFile
+from forest.cli.shared import FRAME, RunFile, check_targets
 
 if TYPE_CHECKING:
     from forest.record.run import Run
@@ -38,6 +38,7 @@ def measure(
     from forest.record.export import write_frame
     from forest.record.run import open_run
 
+    check_targets((to, FRAME), force=force)
     with open_run(run_file) as run:
         at = _year(run, year)
         if to is not None:
@@ -89,6 +90,7 @@ def bucking(
     from forest.record.run import open_run
     from forest.view.measured_table import assortment_table
 
+    check_targets((to, FRAME), force=force)
     asked = DEFAULT_PRODUCTS if products is None else read_products(products)
     with open_run(run_file) as run:
         at = _year(run, year)

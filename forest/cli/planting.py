@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from forest.cli.shared import Overrides, check_targets
+from forest.cli.shared import Overrides, check_targets, given_options
 from forest.cli.surfacing import MESH, working, write_parts
 
 
@@ -38,7 +38,7 @@ def tree(
     quality: Annotated[float, typer.Option(help="Factor on the number of leaves.")] = 1.0,
     readings: Annotated[str, typer.Option(help="corrected or paper.")] = "corrected",
     list_: Annotated[bool, typer.Option("--list", help="List the species.")] = False,
-    force: Annotated[bool, typer.Option(help="Replace the file.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Make a tree of a parametric species (Weber & Penn 1995).
 
@@ -55,10 +55,10 @@ def tree(
     from forest.errors import InputError, nearest
     from forest.parametric import grow, load_parameters, parametric_names
 
-    given = _given(context)
+    given = [option for option in given_options(context) if option != "--list"]
     if list_ or species is None:
         if given or (list_ and species is not None):
-            needs = f"--{given[0].replace('_', '-')} needs a species" if given else ""
+            needs = f"{given[0]} needs a species" if given else ""
             raise InputError(
                 needs or "--list takes no species",
                 expected="forest tree SPECIES with options, or forest tree --list alone",
@@ -66,8 +66,7 @@ def tree(
         for name in parametric_names():
             typer.echo(f"{name:<22} {load_parameters(name).common_name}")
         return
-    if to is not None:
-        check_targets((to, (*MESH, ".csv", ".png", ".gif")), force=force)
+    check_targets((to, (*MESH, ".csv", ".png", ".gif")), force=force)
     seasons = ("spring", "summer", "fall", "winter")
     if season not in seasons:
         raise InputError(f"unknown season '{season}', {nearest(season, seasons)}")
@@ -75,9 +74,9 @@ def tree(
     moving = to is not None and to.suffix.lower() == ".gif"
     if moving and wind == 0.0 and gust == 0.0:
         raise InputError("nothing moves in a .gif", expected="--wind or --gust above 0")
-    only_moving = [name for name in given if name in ("frames", "seconds")]
+    only_moving = [option for option in given if option in ("--frames", "--seconds")]
     if only_moving and not moving:
-        raise InputError(f"--{only_moving[0]} is for a .gif", expected="--to NAME.gif")
+        raise InputError(f"{only_moving[0]} is for a .gif", expected="--to NAME.gif")
     still = grow(parameters, seed, readings=readings, quality=quality)  # type: ignore[arg-type]
     scale = time_scale if time_scale is not None else 2000.0 if moving else 1.0
     times = [time + k * seconds / frames for k in range(frames if moving else 1)]
@@ -106,13 +105,3 @@ def tree(
         draw_sway(moments, to, seconds=seconds, leaves=shown, season=season, overwrite=force)
     else:
         draw_parametric(one, to, leaves=shown, season=season)
-
-
-def _given(context: typer.Context) -> list[str]:
-    """Name the options that stand on the command line, `--list` aside."""
-    return [
-        name
-        for name in context.params
-        if name not in ("species", "list_")
-        and getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
-    ]

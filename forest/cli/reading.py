@@ -11,7 +11,6 @@ from forest.cli.shared import (
     FRAME,
     PICTURE,
     RunFile,
-    check_picture,
     check_targets,
     last_shapes,
     print_pairs,
@@ -67,9 +66,8 @@ def stability(
     from forest.record.run import open_run
     from forest.view.stability_table import classes, stability_of_year, stability_table
 
-    drawn = to is not None and to.suffix.lower() == ".png"
-    if to is not None and drawn:
-        check_picture(to, force)
+    check_targets((to, (*FRAME, *PICTURE)), force=force)
+    drawn = to is not None and to.suffix.lower() in PICTURE
     with open_run(run_file) as run:
         trees = stability_of_year(run, year)
     if to is None:

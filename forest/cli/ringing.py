@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forest.cli.shared import RunFile
+from forest.cli.shared import RunFile, check_targets
 
 if TYPE_CHECKING:
     from forest.dendro import RingSeries
@@ -67,7 +67,8 @@ def rings(
     from forest.errors import InputError
     from forest.record.run import open_run
 
-    suffix = _checked(to, force)
+    check_targets((to, (*_OF_A_TREE, *_SERIES)), force=force)
+    suffix = to.suffix.lower()
     if suffix in _OF_A_TREE and tree is None:
         raise InputError(f"no tree for a {suffix}", expected="--tree ID")
     if dominant is not None and (tree is not None or suffix not in _SERIES):
@@ -97,24 +98,6 @@ def rings(
             _draw(run, tree, at, year, to, force)
 
 
-def _checked(to: Path, force: bool) -> str:
-    """Refuse a path before anything is read; give its suffix."""
-    from forest.errors import InputError, OutputError
-
-    suffix = to.suffix.lower()
-    if suffix not in (*_OF_A_TREE, *_SERIES):
-        raise InputError(
-            f"unknown format '{to.suffix}'",
-            where=str(to),
-            expected="a name that ends in .png, .svg, .rwl, .csv or .vtp",
-        )
-    if to.is_dir() or not to.parent.is_dir():
-        raise OutputError("cannot be written", where=str(to), expected="a file in a folder")
-    if to.exists() and not force:
-        raise InputError("exists already", where=str(to), expected="a new path, or --force")
-    return suffix
-
-
 def _draw(run: Any, tree: int, height: float, year: int | None, to: Path, force: bool) -> None:
     from forest.record.export import whole_file
     from forest.view.disc_picture import draw_disc
@@ -139,7 +122,7 @@ def _of_stand(run: Any, height: float, year: int | None, dominant: int | None) -
 
     from forest.dendro import campaign, ring_series
     from forest.dendro.stems import at_height
-    from forest.errors import InputError
+    from forest.errors import InputError, span_of
 
     if not len(run.years):
         raise InputError("holds no years yet", where=str(run.path))
@@ -148,7 +131,7 @@ def _of_stand(run: Any, height: float, year: int | None, dominant: int | None) -
         raise InputError(
             f"no year {last}",
             where=str(run.path),
-            expected=f"a year from {run.years[0]} to {run.years[-1]}",
+            expected=span_of(run.years[0], run.years[-1]),
         )
     rings = run.rings
     rings = rings[(rings["place"] == "height") & (rings["year"] <= last)]

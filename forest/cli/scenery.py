@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from forest.cli.shared import check_targets
+from forest.cli.shared import check_targets, options_named
 from forest.cli.viewing import scenery_of_path
 
 _SUFFIXES = (".glb", ".vtm", ".vtp", ".png")
@@ -58,6 +58,7 @@ def scene(
         forest scene scenarios/scenery/valley.toml --detail far --to valley.png
     """
     from forest.errors import InputError
+    from forest.surface.detail import Sight
     from forest.surface.scene import scene_range
     from forest.view.scenery import load_scenery, scene_of
 
@@ -66,8 +67,10 @@ def scene(
     check_targets((to, _SUFFIXES), force=force)
     if instanced and to.suffix.lower() != ".glb":
         raise InputError("--instanced is for .glb files", where=str(to))
-    scene_range(detail)
-    is_run = stand.suffix.lower() in (".h5", ".hdf5")
+    with options_named(detail="--detail", season="--season", quality="--quality"):
+        scene_range(detail)
+        Sight(season or "summer", 1.0 if quality is None else quality)
+    is_run = stand.suffix.lower() != ".toml"
     if not is_run and (year is not None or tile != 1):
         raise InputError("--year and --tile are for run files", where=str(stand))
     made = scene_of(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -59,22 +61,55 @@ def check_targets(*targets: tuple[Path | None, tuple[str, ...]], force: bool) ->
     force : bool
         Whether to replace what is there.
     """
-    from forest.errors import InputError, OutputError
+    from forest.errors import InputError
+    from forest.record.export import check_target
 
     seen: set[Path] = set()
     for path, suffixes in targets:
         if path is None:
             continue
         if path.suffix.lower() not in suffixes:
-            expected = f"a name that ends in {' or '.join(suffixes)}"
-            raise InputError(f"unknown format '{path.suffix}'", where=str(path), expected=expected)
-        if path.is_dir() or not path.parent.is_dir():
-            raise OutputError("cannot be written", where=str(path), expected="a file in a folder")
-        if path.exists() and not force:
-            raise InputError("exists already", where=str(path), expected="a new path, or --force")
+            what = f"unknown format '{path.suffix}'" if path.suffix else "has no suffix"
+            raise InputError(what, where=str(path), expected=endings(suffixes))
+        check_target(path, overwrite=force, or_else=", or --force")
         if path.resolve() in seen:
             raise InputError("is asked for twice", where=str(path), expected="a path for each")
         seen.add(path.resolve())
+
+
+def endings(suffixes: Sequence[str]) -> str:
+    """Say how a name may end."""
+    *others, last = suffixes
+    return "a name that ends in " + (f"{', '.join(others)} or {last}" if others else last)
+
+
+def given_options(context: typer.Context) -> list[str]:
+    """Name the options that stand on the command line, as `--time-scale`."""
+    return [
+        option.opts[0]
+        for option in context.command.params
+        if option.opts[0].startswith("-")
+        and getattr(context.get_parameter_source(str(option.name)), "name", "") == "COMMANDLINE"
+    ]
+
+
+@contextmanager
+def options_named(**options: str) -> Iterator[None]:
+    """Let refusals speak of options as they are typed, not of the arguments behind them.
+
+    Parameters
+    ----------
+    **options : str
+        The option for each argument, e.g. ``cell_m="--cell"``.
+    """
+    from forest.errors import InputError
+
+    try:
+        yield
+    except InputError as error:
+        words = "|".join(options)
+        said = re.sub(rf"\b({words})\b", lambda name: options[name[0]], str(error))
+        raise type(error)(said) from None
 
 
 def last_shapes(run_file: Path, scenario: Scenario) -> tuple[int, list[Skeleton]]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forest.cli.shared import RunFile, check_targets
+from forest.cli.shared import RunFile, check_targets, options_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -41,8 +41,8 @@ def mesh(
         typer.Option(metavar="M", help="Smallest cell of a blended surface; default: by size."),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="M", help="How far tubes may be off round.")
-    ] = 0.001,
+        float | None, typer.Option(metavar="M", help="How far tubes may be off; default: 0.001.")
+    ] = None,
     reaction: Annotated[
         bool | None,
         typer.Option(
@@ -69,8 +69,9 @@ def mesh(
         typer.Option("--leaves/--no-leaves", help="Leaf cards; default: with all but .ply."),
     ] = None,
     colour: Annotated[
-        str, typer.Option(help="Of a .png: texture, radius_m, order or birth_year.")
-    ] = "texture",
+        str | None,
+        typer.Option(help="Of a .png: texture, radius_m, order or birth_year; default: texture."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Write the wood of a sample tree as a closed surface, and its leaves as cards.
@@ -98,28 +99,61 @@ def mesh(
 
     check_targets((to, (*MESH, ".png")), force=force)
     if kind not in _KINDS:
-        raise InputError(f"unknown kind '{kind}', {nearest(kind, _KINDS)}")
+        raise InputError(f"unknown kind '{kind}', {nearest(kind, _KINDS)}", where="--kind")
     blend = _Blend(cell, reaction, flare, readings)
     blend.check(kind)
+    check_metres("--cell", cell)
+    if tolerance is not None and kind != "tubes":
+        raise InputError("only tubes have a tolerance", where="--tolerance", expected="--cell")
+    check_metres("--tolerance", tolerance, least_too=True)
+    if colour is not None:
+        check_colour(to, colour)
     with open_run(run_file) as run:
         check_sample(run, tree)
         at = int(run.sample_years(tree)[-1]) if year is None else year
         skeleton = run.skeleton(tree, at)
         species = species_of(run, skeleton)
-    with working(f"the surface of {len(skeleton):,} internodes"):
+    with working(f"the surface of {len(skeleton):,} internodes"), options_named(cell_m="--cell"):
         thin = kind == "blended" and cell is None and too_thin(skeleton)
         wood = (
-            tubes(skeleton, tolerance_m=tolerance)
+            tubes(skeleton, tolerance_m=0.001 if tolerance is None else tolerance)
             if thin or kind == "tubes"
             else blend.surface(skeleton, species)
         )
         cards = leaves_of(skeleton, species) if with_leaves(to, leaves) else None
         parts = tree_parts(wood, skeleton, cards)
-    write_parts(parts, to, colour, force)
+    write_parts(parts, to, colour or "texture", force)
     if thin:
         typer.echo(f"tree {tree} is too thin to blend without --cell: tubes", err=True)
     triangles = sum(len(part.mesh.triangles) for part in parts)
     typer.echo(f"{to}: {triangles:,} triangles, tree {tree} in {at}, {wood.volume:.4g} m3 of wood")
+
+
+def check_metres(option: str, value: float | None, *, least_too: bool = False) -> None:
+    """Refuse what is no length above 0, or of 0 or more; None was not said."""
+    from math import isfinite
+
+    from forest.errors import InputError
+
+    if value is not None and not (
+        isfinite(value) and (value > 0.0 or (least_too and value == 0.0))
+    ):
+        expected = "metres, 0 or more" if least_too else "metres, above 0"
+        raise InputError(f"{option} is {value:g}", expected=expected)
+
+
+def check_colour(to: Path, colour: str) -> None:
+    """Refuse what a picture cannot be coloured by, before a surface is made."""
+    from forest.errors import InputError, nearest
+    from forest.view.surface_picture import COLOURS, TEXTURE
+
+    if to.suffix.lower() != ".png":
+        raise InputError(
+            "--colour is for a .png", where=str(to), expected="a picture, or no --colour"
+        )
+    if colour not in (TEXTURE, *COLOURS):
+        hint = nearest(colour, (TEXTURE, *COLOURS))
+        raise InputError(f"cannot colour by '{colour}', {hint}", where="--colour")
 
 
 def write_parts(parts: Sequence[Part], to: Path, colour: str, force: bool) -> None:
@@ -169,7 +203,7 @@ class _Blend:
             )
         if self.readings not in (None, *READINGS):
             hint = nearest(str(self.readings), READINGS)
-            raise InputError(f"unknown readings '{self.readings}', {hint}")
+            raise InputError(f"unknown readings '{self.readings}', {hint}", where="--readings")
 
     def surface(self, skeleton: Skeleton, species: Species) -> Mesh:
         """Blend a tree."""

@@ -78,7 +78,7 @@ def stand_view(
     else:
         suffixes = (".png",)
     check_targets(*((path, suffixes) for path in frame_paths(to, frames)), force=force)
-    is_run = scene.suffix.lower() in (".h5", ".hdf5")
+    is_run = scene.suffix.lower() != ".toml"
     if not is_run and (year is not None or tile != 1):
         raise InputError("--year and --tile are for run files", where=str(scene))
     scenery = scenery_of_path(scene, year, tile) if is_run else _of_file(scene)

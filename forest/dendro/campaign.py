@@ -9,7 +9,7 @@ import pandas as pd
 from forest.dendro.cores import core
 from forest.dendro.series import RingSeries, assemble
 from forest.dendro.stems import at_height
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 from forest.random import STREAM_CORE, uniforms
 
 
@@ -101,7 +101,7 @@ def _dominant(
     now = trees[(trees["year"] == year) & (trees["status"].astype(str) == "living")]
     if not len(now):
         years = trees["year"]
-        span = f"a year from {years.min()} to {years.max()}" if len(years) else "a run with years"
+        span = span_of(years.min(), years.max()) if len(years) else "a run with years"
         raise InputError(f"no tree lives in {year}", where="campaign", expected=span)
     with_rings = rings.loc[at_height(rings, stem_height_m) & (rings["year"] == year), "tree_id"]
     now = now[now["tree_id"].isin(with_rings) & now[by].notna()]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 from forest.random import STREAM_CLIMATE, normals, uniforms
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Climate:
                 raise InputError(
                     f"no {variable} of {year}",
                     where="climate.series",
-                    expected=f"a year from {series[0].year} to {series[-1].year}",
+                    expected=span_of(series[0].year, series[-1].year),
                 )
 
     def values(self, year: int) -> dict[str, float]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 from forest.measure.bark import bark_thickness, diameter_under_bark
 from forest.measure.biomass import compartments
 from forest.measure.bucking import MODULE_M, Product, buck
@@ -283,7 +283,7 @@ def check_year(run: Run, year: int) -> None:
     """Refuse a year that is not on file."""
     if year in run.years:
         return
-    years = f"a year from {run.years[0]} to {run.years[-1]}" if len(run.years) else "a whole year"
+    years = span_of(run.years[0], run.years[-1]) if len(run.years) else "a whole year"
     what = f"no year {year}" if len(run.years) else "no year on file yet"
     raise InputError(what, where=str(run.path), expected=years)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -70,9 +71,76 @@ def write_frame(
     return len(frame)
 
 
+def check_target(to: Path, *, overwrite: bool, or_else: str = "") -> None:
+    """Refuse a path to which no file can be written. Writes nothing.
+
+    Parameters
+    ----------
+    to : path
+        The file; with an .obj goes its .mtl, with a .vtm the folder of its blocks.
+    overwrite : bool
+        Whether to replace what is there.
+    or_else : str
+        How the user could ask for that.
+
+    Raises
+    ------
+    InputError
+        If the file exists and must not be replaced, or is a folder.
+    OutputError
+        If there is no folder for it, or none that can be written.
+    """
+    try:
+        if to.is_dir():
+            raise InputError("is a folder", where=str(to), expected="the path of a file")
+        check_folder(to.parent, where=to)
+        blocks = to.with_suffix("") if to.suffix.lower() == ".vtm" else None
+        beside = to.with_suffix(".mtl") if to.suffix.lower() == ".obj" else blocks
+        for path in filter(None, (to, beside)):
+            if path.exists() and not overwrite:
+                raise InputError("exists already", where=str(path), expected=f"a new path{or_else}")
+        if blocks is not None and blocks.exists() and not _holds_blocks(blocks):
+            raise InputError(
+                "exists already and holds other things",
+                where=str(blocks),
+                expected="room for the blocks",
+            )
+    except OSError as error:
+        raise OutputError.of(error, to) from error
+
+
+def check_folder(folder: Path, *, where: Path) -> None:
+    """Refuse a folder that is not there, or into which nothing can be written.
+
+    Raises
+    ------
+    OutputError
+        If nothing can be written.
+    """
+    if folder.exists() and not folder.is_dir():
+        what, expected = f"cannot be written: '{folder}' is a file", "a path in a folder"
+        raise OutputError(what, where=str(where), expected=expected)
+    if not folder.is_dir():
+        what, expected = (
+            f"cannot be written: there is no folder '{folder}'",
+            "a folder that is there already",
+        )
+        raise OutputError(what, where=str(where), expected=expected)
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise OutputError.of(error, where) from error
+
+
+def _holds_blocks(folder: Path) -> bool:
+    return folder.is_dir() and all(path.suffix == ".vtp" for path in folder.iterdir())
+
+
 @contextmanager
 def whole_file(to: str | Path, *, overwrite: bool) -> Iterator[Path]:
     """Give the path of a draft that becomes the file when it is done, whole or not at all.
+
+    What is written beside the draft, in its folder, goes with it.
 
     Raises
     ------
@@ -82,16 +150,47 @@ def whole_file(to: str | Path, *, overwrite: bool) -> Iterator[Path]:
         If it cannot be written.
     """
     to = Path(to)
-    if to.is_dir():
-        raise InputError("is a folder", where=str(to), expected="the path of a file")
-    if to.exists() and not overwrite:
-        raise InputError("exists already", where=str(to), expected="a new path")
+    check_target(to, overwrite=overwrite)
     try:
         # A folder of its own: the draft keeps the suffix, and the rights are the usual ones.
         with tempfile.TemporaryDirectory(prefix=f".{to.name}.", dir=to.parent) as folder:
             draft = Path(folder) / to.name
             yield draft
+            beside = [path for path in sorted(draft.parent.iterdir()) if path != draft]
+            places = [to.with_name(path.name) for path in beside]
+            for place in places:
+                if place.exists() and not overwrite:
+                    raise InputError("exists already", where=str(place), expected="a new path")
+            for path, place in zip(beside, places, strict=True):
+                if path.is_dir() and place.is_dir():
+                    shutil.rmtree(place)
+                path.replace(place)
             draft.replace(to)
+    except OSError as error:
+        raise OutputError.of(error, to) from error
+
+
+@contextmanager
+def whole_folder(to: Path) -> Iterator[Path]:
+    """Give a draft of a folder, whose files come into the folder when all of them are done.
+
+    Files of the same names are replaced, others stay.
+
+    Raises
+    ------
+    OutputError
+        If they cannot be written.
+    """
+    check_folder(to.parent, where=to)
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{to.name}.", dir=to.parent) as folder:
+            yield Path(folder)
+            for path in sorted(Path(folder).rglob("*")):
+                place = to / path.relative_to(folder)
+                if path.is_dir():
+                    continue
+                place.parent.mkdir(parents=True, exist_ok=True)
+                path.replace(place)
     except OSError as error:
         raise OutputError.of(error, to) from error
 

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.errors import InputError, nearest
+from forest.errors import InputError, nearest, span_of
 from forest.record.identity import check_identity, check_run_file, damage_reported
 from forest.record.journal import JournaledFile
 from forest.record.schema import ALL_TABLES
@@ -275,7 +275,7 @@ class Run:
             raise InputError(
                 f"tree {tree_id} is not on record in {year}",
                 where=str(self.path),
-                expected=f"a year from {years[0]} to {years[-1]}",
+                expected=span_of(years[0], years[-1]),
             )
         with damage_reported(self.path):
             return self._shape(tree_id, year)

@@ -18,7 +18,7 @@ from forest.dendro.section import Section
 from forest.dendro.section import section as cut
 from forest.dendro.stems import RING_COLUMNS, StemRings, at_height, rings_at
 from forest.dendro.turns import shortest_turn, unit
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 from forest.measure.stem import stem_path
 from forest.record.identity import damage_reported
 from forest.trees.skeleton import Skeleton
@@ -212,7 +212,7 @@ def _rings(run: Run, tree_id: int, height_m: float, year: int | None) -> StemRin
         raise InputError(
             f"tree {tree_id} has no ring of {year}",
             where=str(run.path),
-            expected=f"a year from {rings['year'].min()} to {last}",
+            expected=span_of(rings["year"].min(), last),
         )
     found = rings_at(upto, tree_id, height_m)
     radius_m = _breast_radius(run, found) if found.cambial_age[0] > 1 else math.nan
@@ -262,7 +262,7 @@ def _check_years(run: Run, year: int | None) -> None:
         raise InputError(
             f"no year {year}",
             where=str(run.path),
-            expected=f"a year from {run.years[0]} to {run.years[-1]}",
+            expected=span_of(run.years[0], run.years[-1]),
         )
 
 

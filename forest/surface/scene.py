@@ -150,7 +150,7 @@ def scene_range(detail: str | float) -> float:
         range_m = float(detail)
     except ValueError:
         hint = f"{nearest(str(detail), tuple(DETAILS))}, or a range in m"
-        raise InputError(f"unknown detail {detail!r}", expected=hint) from None
+        raise InputError(f"unknown detail {detail!r}, {hint}") from None
     if not 0.0 <= range_m < np.inf:
         raise InputError(f"detail is {range_m:g}", expected="a range of 0 m or more")
     return range_m

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from forest.record.export import whole_file
 from forest.view.looks import look_of
 
 if TYPE_CHECKING:
@@ -128,4 +129,5 @@ def draw_development(run: HasTables, to: str | Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     if table["species"].astype(str).nunique() > 2:
         panels[0, 0].legend(fontsize=8, frameon=False)
-    figure.savefig(to, dpi=110)
+    with whole_file(to, overwrite=True) as draft:
+        figure.savefig(draft, dpi=110)

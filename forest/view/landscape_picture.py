@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from forest.record.export import whole_file
 from forest.view.landscape_table import HasPlots, year_of
 from forest.view.looks import RGB, look_of
 
@@ -83,7 +84,8 @@ def draw_landscape(landscape: HasPlots, to: str | Path, *, year: int | None = No
         x=0.01,
         ha="left",
     )
-    figure.savefig(to, dpi=110)
+    with whole_file(to, overwrite=True) as draft:
+        figure.savefig(draft, dpi=110)
 
 
 class _Mosaic(NamedTuple):

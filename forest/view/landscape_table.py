@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,7 +56,7 @@ def year_of(landscape: HasPlots, year: int | None) -> int:
         return years[-1]
     if year not in years:
         raise InputError(
-            f"no year {year}", where="landscape", expected=f"a year from {years[0]} to {years[-1]}"
+            f"no year {year}", where="landscape", expected=span_of(years[0], years[-1])
         )
     return year
 

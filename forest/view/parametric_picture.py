@@ -160,7 +160,8 @@ def draw_parametric(
     from PIL import Image
 
     picture = _render(tree, leaves and has_leaves(tree, season), season, window, box_of(tree))
-    Image.fromarray(picture).save(Path(to))
+    with whole_file(to, overwrite=True) as draft:
+        Image.fromarray(picture).save(draft)
 
 
 def draw_sway(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.record.export import whole_file
 from forest.trees.skeleton import Skeleton
 from forest.view.shading import SUN, LightVolume, shade
 from forest.view.shapes import gather_leaves, gather_wood, polylines
@@ -186,7 +187,8 @@ def save(plotter: Any, to: str | Path) -> None:
     """Render, average the fine pixels and write a PNG."""
     from PIL import Image
 
-    Image.fromarray(pixels(plotter)).save(Path(to))
+    with whole_file(to, overwrite=True) as draft:
+        Image.fromarray(pixels(plotter)).save(draft)
 
 
 def pixels(plotter: Any) -> NDArray[np.uint8]:

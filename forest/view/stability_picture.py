@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from forest.record.export import whole_file
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -45,4 +47,5 @@ def draw_stability(trees: pd.DataFrame, to: str | Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     if len(thick):
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", fontsize=8)
-    figure.savefig(to, dpi=110)
+    with whole_file(to, overwrite=True) as draft:
+        figure.savefig(draft, dpi=110)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from forest.record.export import whole_file
 from forest.view.sweep_table import HasMeans, means_of_sets, varied
 
 _PANELS = {"n_ha": "Stems per ha", "basal_area_m2ha": "Basal area, m²/ha"}
@@ -42,4 +43,5 @@ def draw_sweep(sweep: HasMeans, to: str | Path) -> None:
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", fontsize=8)
-    figure.savefig(to, dpi=110)
+    with whole_file(to, overwrite=True) as draft:
+        figure.savefig(draft, dpi=110)

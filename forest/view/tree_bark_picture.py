@@ -59,7 +59,7 @@ def draw_trunk(
     high_m = min(high_m, path.high)
     if not low_m < high_m:
         raise InputError(
-            f"no trunk from {low_m:g} to {high_m:g} m", where="bark", expected="more of it"
+            f"no trunk from {low_m:g} m up", where="bark", expected=f"0 to {path.high:.2f} m"
         )
     centre = path.frame(np.array([0.5 * (low_m + high_m)]))[0][0]
     moments = [bark.at(year) for year in years] or [bark]

@@ -190,7 +190,7 @@ def test_export_round_trip(run: Run, tmp_path: Path, suffix: str) -> None:
     [
         ("trees.xlsx", "unknown format '.xlsx'; expected a name that ends in .csv or .parquet"),
         ("trees", "unknown format ''"),
-        ("missing/trees.csv", "cannot be written: no such file or directory"),
+        ("missing/trees.csv", "cannot be written: there is no folder"),
     ],
 )
 def test_export_refuses(run: Run, tmp_path: Path, name: str, message: str) -> None:

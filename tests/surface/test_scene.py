@@ -231,7 +231,7 @@ def test_files_are_replaced_only_when_asked(scene: Scene, tmp_path: Path) -> Non
             write_scene(scene, path)
         write_scene(scene, path, overwrite=True)
     (tmp_path / "s" / "other.txt").write_text("mine")
-    with pytest.raises(InputError, match="room for the blocks"):
+    with pytest.raises(InputError, match="exists already"):
         write_scene(scene, tmp_path / "s.vtm", overwrite=True)
     assert (tmp_path / "s" / "other.txt").read_text() == "mine"
 

@@ -159,7 +159,7 @@ def test_the_command_blends_as_it_is_told(
         (("--tree", "1", "--to", "x.png", "--colour", "radius"), "did you mean 'radius_m'?"),
         (
             ("--tree", "1", "--to", "x.glb", "--kind", "tubes", "--tolerance", "-1"),
-            "tolerance_m is -1",
+            "--tolerance is -1",
         ),
     ],
 )

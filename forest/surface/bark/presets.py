@@ -168,10 +168,8 @@ class Preset(Table):
         if path.suffix != ".toml":
             path = _FOLDER / f"{name_or_path}.toml"
             if not path.is_file():
-                raise InputError(
-                    f"no bark preset '{name_or_path}'",
-                    expected=nearest(str(name_or_path), preset_names()) + " (or a file, *.toml)",
-                )
+                hint = nearest(str(name_or_path), preset_names())
+                raise InputError(f"no bark preset '{name_or_path}', {hint} (or a file, *.toml)")
         try:
             return cls.model_validate(parse_toml(read_text(path, where=str(path)), where=path.name))
         except ValidationError as error:

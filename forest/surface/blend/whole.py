@@ -144,6 +144,13 @@ def blended(
     cell_m = usual_cell(skeleton) if cell_m is None else float(cell_m)
     if not (np.isfinite(cell_m) and cell_m > 0.0):
         raise InputError(f"a cell of {cell_m} m", where="cell_m", expected="a width above 0")
+    thickest = float(skeleton.radius.max())
+    if THINNEST * cell_m > thickest:
+        raise InputError(
+            f"the thickest internode has a radius of {thickest:.3g} m",
+            where="cell_m",
+            expected=f"cells of {thickest / THINNEST:.2g} m or less",
+        )
     if not 1.0 <= cells_in_radius <= 50.0:
         raise InputError(f"{cells_in_radius}", where="cells_in_radius", expected="1 to 50")
     blend = blend_of(

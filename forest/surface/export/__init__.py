@@ -42,11 +42,11 @@ def write_mesh(
         The file; its suffix, one of `SUFFIXES`, names the format. ``.glb`` and ``.obj`` have y
         up, materials and texture coordinates; ``.ply`` and ``.vtp`` have z up and keep points
         that are shared, so that closed surfaces stay closed. Beside an ``.obj`` go its ``.mtl``
-        and images, and replace files of their names.
+        and images, under names of its own.
     materials : Material
         Of the one mesh.
     overwrite : bool
-        Whether to replace a file.
+        Whether to replace files.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def write_mesh(
     suffix = to.suffix.lower()
     if suffix not in SUFFIXES:
         hint = nearest(suffix, SUFFIXES)
-        raise InputError(f"unknown format '{to.suffix}'", where=str(to), expected=hint)
+        raise InputError(f"unknown format '{to.suffix}', {hint}", where=str(to))
     parts = [Part(what, materials)] if isinstance(what, Mesh) else what
     parts = [part for part in parts if len(part.mesh.triangles)]
     if not parts:
@@ -78,7 +78,7 @@ def write_mesh(
         elif suffix == ".obj":
             from forest.surface.export.obj import write_obj
 
-            write_obj(parts, draft, to)
+            write_obj(parts, draft)
         elif suffix == ".ply":
             from forest.surface.export.ply import write_ply
 

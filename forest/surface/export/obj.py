@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from forest.record.export import whole_file
 from forest.surface.export.glb import Y_UP
 from forest.surface.export.parts import Material, Part, encoded, mime_type
 
@@ -15,21 +14,19 @@ _STATEMENTS = {"colour": "map_Kd", "normal": "norm", "rough": "map_Pr"}
 _SUFFIXES = {"image/png": ".png", "image/jpeg": ".jpg"}
 
 
-def write_obj(parts: Sequence[Part], draft: Path, to: Path) -> None:
+def write_obj(parts: Sequence[Part], to: Path) -> None:
     """Write parts as objects, with points that several faces share and corners of texture.
 
     Parameters
     ----------
     parts : sequence of Part
         Meshes with triangles.
-    draft : path
-        The .obj file as it is being written.
     to : path
-        Where it will be; the .mtl file and the images go beside it, named after it.
+        The .obj file; the .mtl file and the images go beside it, named after it.
     """
     _write_materials(parts, to)
     points, corners = 1, 1
-    with draft.open("w", encoding="ascii", newline="\n") as file:
+    with to.open("w", encoding="ascii", newline="\n") as file:
         file.write(f"# metres, y up\nmtllib {_material_file(to).name}\n")
         for part in parts:
             mesh = part.placed()
@@ -57,8 +54,7 @@ def _material_file(to: Path) -> Path:
 def _write_materials(parts: Sequence[Part], to: Path) -> None:
     materials = {part.material.name: part.material for part in parts}
     text = "".join(_described(material, to) for material in materials.values())
-    with whole_file(_material_file(to), overwrite=True) as draft:
-        draft.write_text(text, encoding="utf-8", newline="\n")
+    _material_file(to).write_text(text, encoding="utf-8", newline="\n")
 
 
 def _described(material: Material, to: Path) -> str:
@@ -74,8 +70,7 @@ def _described(material: Material, to: Path) -> str:
     for what, image in material.images.items():
         content = encoded(image)
         name = f"{to.stem}_{material.name}_{what}{_SUFFIXES[mime_type(content)]}"
-        with whole_file(to.with_name(name), overwrite=True) as draft:
-            draft.write_bytes(content)
+        to.with_name(name).write_bytes(content)
         lines.append(f"{_STATEMENTS[what]} {name}")
         if what == "colour" and material.cut_out:
             lines.append(f"map_d -imfchan m {name}")

@@ -56,7 +56,7 @@ def write_scene(
     suffix = to.suffix.lower()
     if suffix not in SCENE_SUFFIXES:
         hint = nearest(suffix, SCENE_SUFFIXES)
-        raise InputError(f"unknown format '{to.suffix}'", where=str(to), expected=hint)
+        raise InputError(f"unknown format '{to.suffix}', {hint}", where=str(to))
     if instanced and suffix != ".glb":
         raise InputError("instanced leaves are for .glb files", where=str(to))
     if suffix == ".glb":
@@ -72,5 +72,5 @@ def write_scene(
         if suffix == ".vtp":
             write_scene_vtp(scene, draft, say)
         else:
-            write_scene_vtm(scene, draft, to, say, overwrite=overwrite)
+            write_scene_vtm(scene, draft, say)
     return to

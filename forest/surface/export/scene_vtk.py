@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -65,25 +64,11 @@ def write_scene_vtp(scene: Scene, draft: Path, say: _Say) -> None:
     first.append_polydata(*others).save(draft)
 
 
-def write_scene_vtm(scene: Scene, draft: Path, to: Path, say: _Say, *, overwrite: bool) -> None:
-    """Write a table of blocks, and the blocks into a folder of its name.
-
-    Raises
-    ------
-    InputError
-        If there is such a folder and it must not be replaced, or holds anything but blocks.
-    """
+def write_scene_vtm(scene: Scene, draft: Path, say: _Say) -> None:
+    """Write a table of blocks, and the blocks into a folder of its name beside it."""
     import pyvista
 
-    folder = to.with_suffix("")
-    if folder.exists():
-        ours = folder.is_dir() and all(path.suffix == ".vtp" for path in folder.iterdir())
-        if not (overwrite and ours):
-            raise InputError("exists already", where=str(folder), expected="room for the blocks")
     pyvista.MultiBlock(dict(blocks(scene, say))).save(draft)
-    if folder.exists():
-        shutil.rmtree(folder)
-    shutil.move(draft.with_suffix(""), folder)
 
 
 def wood_cells(mesh: Mesh) -> _Piece:

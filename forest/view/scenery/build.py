@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 from forest.parametric import Parameters, ParametricTree, grow, load_parameters
 from forest.species.text import input_error
 from forest.surface.feature_map import FeatureMap, Spreading, asked_for, read_feature_map, spread
@@ -325,6 +325,6 @@ def _sample(row: Trees, folder: Path, where: str, key: str) -> tuple[Model, floa
             raise input_error(
                 f"tree {row.sample} is not on record in {year}",
                 where=f"{where}: {key}.year",
-                expected=f"a year from {years[0]} to {years[-1]}",
+                expected=span_of(years[0], years[-1]),
             )
         return simulated_model(run.skeleton(row.sample, year), run.scenario.species)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 from forest.parametric import Parameters, load_parameters
 from forest.record.run import Run
 from forest.residual import GrownResidual, grow_residual
@@ -259,7 +259,7 @@ def _year(run: Run, year: int | None) -> int:
         raise InputError(
             f"year {year} is not on record",
             where=str(run.path),
-            expected=f"a year from {run.years[0]} to {run.years[-1]}",
+            expected=span_of(run.years[0], run.years[-1]),
         )
     return year
 
