@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from forest.cli.shared import RunFile, check_targets
+from forest.cli.shared import RunFile, check_targets, options_named
 
 if TYPE_CHECKING:
     from forest.view.movie import FilmSettings
@@ -75,7 +75,8 @@ def movie(
         raise InputError("--year, --grow and --shape are for films of a tree", expected="--tree ID")
     if tree is not None and (from_year is not None or to_year is not None):
         raise InputError("--from-year and --to-year are for films of a stand", expected="--year")
-    with open_run(run_file) as run, _frames_shown() as (begin, done):
+    options = {"from_year": "--from-year", "to_year": "--to-year"}
+    with open_run(run_file) as run, options_named(**options), _frames_shown() as (begin, done):
         if tree is None:
             from forest.view.movie import film_stand
 

@@ -113,10 +113,10 @@ def film_stand(
     to = Path(to)
     check_film(to, settings.size)
     years = StandYears(run)
-    first = years.check_year(from_year, "--from-year", years.first)
-    last = years.check_year(to_year, "--to-year", years.last)
+    first = years.check_year(from_year, "from_year", years.first)
+    last = years.check_year(to_year, "to_year", years.last)
     if last < first:
-        raise InputError(f"--to-year {last} lies before --from-year {first}")
+        raise InputError(f"to_year {last} lies before from_year {first}")
     colours = TreeColours.of_run(run, colour)
     usual = np.clip(_SECONDS_PER_YEAR * (last - first), *_USUAL_SECONDS)
     count = settings.count(_TURN_SECONDS if first == last else float(usual))

@@ -78,13 +78,13 @@ class StandYears:
         self.gone = lru_cache(maxsize=2)(self._gone)
         self.residual = lru_cache(maxsize=2)(self._residual)
 
-    def check_year(self, year: int | None, option: str, usual: int) -> int:
+    def check_year(self, year: int | None, name: str, usual: int) -> int:
         """Give the year, the usual one if none is given; refuse one that is not on file."""
         if year is None:
             return usual
         if not self.first <= year <= self.last:
             raise InputError(
-                f"{option} is {year}",
+                f"{name} is {year}",
                 where=str(self.run.path),
                 expected=f"a year on file, {self.first} to {self.last}",
             )
