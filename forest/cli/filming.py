@@ -161,11 +161,15 @@ def _frames_shown() -> Iterator[tuple[Callable[[int], object], Callable[[], obje
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
     from rich.progress import TimeRemainingColumn as Remaining
 
-    columns = (TextColumn("frames"), BarColumn(), MofNCompleteColumn(), Remaining())
+    from forest._jit import announce_compiling
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Remaining())
     console = Console(stderr=True)
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
         task = progress.add_task("frames", total=None)
-        yield (
-            lambda count: progress.update(task, total=count),
-            lambda: progress.advance(task),
-        )
+        compiling = "compiling kernels that this machine has not run yet (up to a minute)"
+        with announce_compiling(lambda: progress.update(task, description=compiling)):
+            yield (
+                lambda count: progress.update(task, total=count),
+                lambda: progress.update(task, advance=1, description="frames"),
+            )

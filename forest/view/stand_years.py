@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from forest.errors import InputError
+from forest.errors import InputError, span_of
 from forest.record.run import Run
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class StandYears:
             raise InputError(
                 f"{name} is {year}",
                 where=str(self.run.path),
-                expected=f"a year on file, {self.first} to {self.last}",
+                expected=span_of(self.first, self.last),
             )
         return year
 
