@@ -9,11 +9,13 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from PIL import Image
 
 from forest.errors import InputError
 from forest.record.run import Run, open_run
+from forest.view.report import sections
 from forest.view.report.parts import number
 from forest.view.report.sections import STAND_COLUMNS
 from tests.everything import TOML as EVERYTHING
@@ -157,6 +159,75 @@ def test_the_same_run_gives_the_same_page(made: tuple[Path, Path], tmp_path: Pat
     assert to.read_bytes() == made[1].read_bytes()
 
 
+class Tables:
+    """Tables of a run, by hand."""
+
+    def __init__(self, **frames: pd.DataFrame) -> None:
+        self.tables = tuple(frames)
+        self._frames = frames
+
+    def __getattr__(self, name: str) -> pd.DataFrame:
+        return self._frames[name]
+
+    def count(self, table: str) -> int:
+        return len(self._frames[table])
+
+
+def test_storms_by_hand() -> None:
+    storms = pd.DataFrame(
+        {
+            "year": [2003] * 5 + [2005] * 2,
+            "storm": [1, 1, 1, 2, 2, 1, 1],
+            "storm_m_s": [20.0] * 3 + [25.0] * 2 + [30.0] * 2,
+            "direction_deg": 90.0,
+            "outcome": ["stood", "broken", "uprooted", "broken", "broken", "stood", "stood"],
+        }
+    )
+    section = sections.storm_section(Tables(storms=storms))
+    assert section is not None
+    (rows,) = Page(section.html).tables.values()
+    assert rows[1:] == [
+        ["2003, 1", "20.0", "90", "3", "1", "1"],
+        ["2003, 2", "25.0", "90", "2", "2", "0"],
+        ["2005, 1", "30.0", "90", "2", "0", "0"],
+    ]
+    assert sections.storm_section(Tables(storms=storms[:0])) is None
+
+
+def test_balances_by_hand() -> None:
+    years = [2001, 2002, 2003]
+    deadwood = pd.DataFrame(
+        {"year": years, "species": "all", "standing_m3ha": [0.0, 4.0, 2.0], "lying_m3ha": 1.5}
+    )
+    regeneration = pd.DataFrame(
+        {
+            "year": years * 2,
+            "species": ["picea_abies"] * 3 + ["fagus_sylvatica"] * 3,
+            "n_ha": [100.0, 200.0, 50.0, 10.0, 20.0, 30.0],
+            "recruits_ha": 0.0,
+        }
+    )
+    climate = pd.DataFrame(
+        {
+            "year": years,
+            "species": "picea_abies",
+            "temperature_c": [8.0, 9.5, 7.0],
+            "precipitation_mm": float("nan"),
+            "drought_index": float("nan"),
+            "factor": 1.0,
+        }
+    )
+    tables = Tables(deadwood=deadwood, regeneration=regeneration, climate=climate)
+    section = sections.flow_section(tables)
+    assert section is not None
+    alts = [given["alt"] for tag, given in Page(section.html).tags if tag == "img"]
+    assert len(alts) == 3  # no curve for what is not known, none for a factor that stays
+    assert "9.5" in alts[0] and "temperature" in alts[0]
+    assert "standing: 0 in 2001, 2 in 2003, lowest 0, highest 4" in alts[1]
+    assert "seedlings: 110 in 2001, 80 in 2003, lowest 80, highest 220" in alts[2]
+
+
+@pytest.mark.stand
 def test_everything_is_reported(tmp_path: Path) -> None:
     toml = tmp_path / "everything.toml"
     toml.write_text(EVERYTHING)
