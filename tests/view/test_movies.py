@@ -145,7 +145,7 @@ def test_colours_are_on_one_scale(run_file: Path, by: str) -> None:
     ("words", "said"),
     [
         (("--to", "stand.avi"), ".mp4 or .gif"),
-        (("--to", "nowhere/stand.gif"), "a file in a folder"),
+        (("--to", "nowhere/stand.gif"), "there is no folder"),
         (("--to", "a.gif", "--colour", "hight"), "did you mean 'height'?"),
         (("--to", "a.gif", "--view", "abov"), "did you mean 'above'?"),
         (("--to", "a.gif", "--to-year", 2050), "2001 to 2008"),

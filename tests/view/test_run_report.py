@@ -274,7 +274,7 @@ def test_what_is_refused(made: tuple[Path, Path], tmp_path: Path) -> None:
     old.write_text("older")
     for to, said in (
         (tmp_path / "report.pdf", ".html"),
-        (tmp_path / "nowhere" / "report.html", "a file in a folder"),
+        (tmp_path / "nowhere" / "report.html", "there is no folder"),
         (old, "--force"),
     ):
         code, _, err = forest("report", made[0], "--to", to)
