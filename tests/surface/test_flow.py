@@ -17,7 +17,7 @@ from forest.surface.flow.relink import relink
 from tests.reference import flow as slow
 from tests.surface.limbs import Limb, branched, pole, tree
 
-PRINTED = FlowRules(steering=0.0)
+PRINTED = FlowRules(steering=0.0, finest_link=np.inf)
 
 
 @pytest.fixture(scope="module")
@@ -110,13 +110,40 @@ def test_links_pull_like_springs_without_length() -> None:
 def test_the_chain_parts_into_two_loops_at_a_branching(rules: FlowRules, angle: float) -> None:
     found = flow(Blend.of(limbs_of(branched(angle))), rules=rules)
     assert found.relinked == 1
-    assert found.stuck <= (1 if rules.steering == 0.0 else 0)  # momentum alone may leave one
+    assert found.stuck <= (2 if rules.steering == 0.0 else 0)  # momentum alone may leave two
     counts = [len(chain) for chain in found.chains]
     assert counts == sorted(counts)
     assert counts[0] == 1 and counts[-1] == 2
     last = found.chains[-1]
     on = [set(part.tolist()) for part in np.split(last.limb, last.first[1:-1])]
     assert sorted(on, key=min) == [{0}, {1}]
+
+
+def test_the_chain_parts_at_every_limb_of_a_crown() -> None:
+    """Limbs of all angles, thin ones, two from one place and one on a limb."""
+    shapes = [Limb(-1, 0, (0, 0, 0), (0, 0, 1.6), 0.1, 0.05)]
+    for k, (at, lean, thick) in enumerate(
+        ((1, 90.0, 0.05), (2, 60.0, 0.02), (4, 75.0, 0.05), (4, 75.0, 0.04), (6, 35.0, 0.04))
+    ):
+        around, lean = (np.pi if k == 3 else 2.4 * k), np.radians(lean)
+        way = np.array([np.sin(lean) * np.cos(around), np.sin(lean) * np.sin(around), np.cos(lean)])
+        base = np.array([0.0, 0.0, 0.2 * (at + 1)])
+        shapes.append(Limb(0, at, base, base + 0.6 * way, thick, 0.6 * thick))
+    middle, side = shapes[1].start + 0.525 * (shapes[1].end - shapes[1].start), (0.1, 0.25, 0.1)
+    shapes.append(Limb(1, 6, middle, middle + np.array(side), 0.02, 0.015))
+    found = flow(Blend.of(limbs_of(tree(*shapes))))
+    assert found.stuck == 0
+    assert found.relinked == len(shapes) - 1
+    last = found.chains[-1]
+    on = [set(part.tolist()) for part in np.split(last.limb, last.first[1:-1])]
+    assert sorted(on, key=min) == [{k} for k in range(len(shapes))]
+
+
+def test_by_momentum_alone_the_chain_hangs_under_a_limb_at_90_degrees() -> None:
+    blend = Blend.of(limbs_of(branched(90.0)))
+    printed = flow(blend, rules=PRINTED, seconds=8.0)
+    assert printed.relinked == 0
+    assert printed.stuck > 0
 
 
 def test_no_particle_leaves_the_surface(junction: tuple[Blend, Flow]) -> None:
@@ -233,6 +260,8 @@ def test_wrong_rules_are_refused() -> None:
         {"speed": 0.0},
         {"speed": np.inf},
         {"least_link": 0.0},
+        {"finest_link": 0.0},
+        {"finest_link": np.nan},
         {"spring": np.nan},
         {"skeleton_damping": -1.0},
         {"spiral_deg": 90.0},

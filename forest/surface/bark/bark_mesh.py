@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.surface.bark.axes import AxisPath
+from forest.surface.bark.collar import Collar, blended_maps, foot_of, seam_of
 from forest.surface.bark.dressing import Dress, grow_preset
 from forest.surface.bark.maps import BarkMaps, bark_maps
 from forest.surface.bark.tree_bark import TreeBark
@@ -23,6 +24,7 @@ _Floats = NDArray[np.float64]
 _TILE_PIXELS = 512
 _MOST_PIXELS = 16384
 _LEAST_PIXELS = 16
+_SUNK = 0.6  # radii by which a branch reaches into its parent below its bark
 _ON_AXIS = 0.01  # radii: nearer to the axis a point has no side
 
 
@@ -62,6 +64,7 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
     middle = wood.points[wood.triangles].mean(axis=1)
     taken = np.zeros(len(axis), np.bool_)
     parts = []
+    axis = _borne(bark, axis, middle)
     for number, maps in bark.maps(size, dress=dress).items():
         path = bark.tree.path(number)
         low, high = _covered(bark, number)
@@ -76,6 +79,11 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
         place = place.reshape(-1, 3)
         uv = _corners(turn[place], (v[place] - low) / (high - low))
         name = f"bark_{number}"
+        if path.parent >= 0:
+            seam = np.isin(used, wood.triangles[axis == path.parent])
+            parent, shape = bark.tree.path(path.parent), maps.height.shape
+            collar = seam_of(path, parent, wood.points[used], seam, shape, low, high)
+            maps = maps if collar is None else blended_maps(bark, maps, path, collar, dress)
         mesh = Mesh(
             wood.points[used],
             place.astype(np.int32),
@@ -86,6 +94,20 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
     if not taken.all():
         parts.append(_young(bark, _kept(wood, ~taken), dress))
     return parts
+
+
+def _borne(bark: TreeBark, axis: NDArray[np.int64], middle: _Floats) -> NDArray[np.int64]:
+    """Give triangles at a branch's foot, before its strips begin, to what bears it."""
+    axis = axis.copy()
+    for path in reversed(bark.tree.paths):
+        if path.parent >= 0:
+            of = np.flatnonzero(axis == path.axis)
+            of = of[path.locate(middle[of])[0] < _covered(bark, path.axis)[0]]
+            parent = bark.tree.path(path.parent)
+            along, _, away = parent.locate(middle[of])
+            # What lies deep in it, the foot of a tube, has no place on its surface.
+            axis[of[away > 0.8 * parent.radius_at(along)]] = path.parent
+    return axis
 
 
 def displaced_parts(
@@ -140,9 +162,19 @@ def displaced_parts(
             piece, dress, (max(columns, _LEAST_PIXELS), max(rows, _LEAST_PIXELS)),
             axis=number, folds=bark.folds(number), seed=bark.seed,
         )  # fmt: skip
-        girth = np.interp(_rows(maps, low), piece.strips.along, piece.strips.girth)
         path = bark.tree.path(number)
-        mesh = _tube(path, low, girth / (2.0 * np.pi), maps, bark.tree.skeleton)
+        v = _rows(maps, low)
+        deep = np.zeros((len(v), maps.height.shape[1]))
+        if path.parent >= 0 and low - path.low < float(piece.strips.width[0]):
+            v = np.concatenate((_sunk(path, low, cell_m), v))
+            collar, deep = foot_of(path, bark.tree.path(path.parent), v, deep.shape[1])
+            shown = slice(-2, -2 - len(maps.height), -1)  # rows of the map, from the top
+            collar = Collar(*(column[shown] for column in collar))
+            maps = blended_maps(bark, maps, path, collar, dress)
+        radius = np.interp(v, piece.strips.along, piece.strips.girth)[:, None] / (2.0 * np.pi)
+        # It shrinks from its parent's surface inward, so that it does not show in cracks.
+        radius = np.maximum(radius - deep, 0.3 * radius)
+        mesh = _tube(path, v, radius, maps, bark.tree.skeleton)
         name = f"bark_{number}"
         parts.append(Part(mesh, material_of(maps, name, bumpy=False), name))
     if whole and axes is None and low_m is None and high_m is None:
@@ -216,16 +248,26 @@ def _rows(maps: BarkMaps, low: float) -> _Floats:
     return low + maps.length_m * np.concatenate(([0.0], middles, [1.0]))
 
 
-def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton: Skeleton) -> Mesh:
-    """Lay a closed tube with a point for each pixel of a map, raised by its height."""
+def _sunk(path: AxisPath, low: float, cell_m: float) -> _Floats:
+    """Where a branch has rings below its map, so that it stands in its parent's cracks, m."""
+    deepest = max(low - _SUNK * float(path.radius_at(np.array([low]))[0]), 0.0)
+    return np.linspace(deepest, low, int(np.ceil((low - deepest) / cell_m)), endpoint=False)
+
+
+def _tube(path: AxisPath, v: _Floats, radius: _Floats, maps: BarkMaps, skeleton: Skeleton) -> Mesh:
+    """Lay a closed tube with a point for each pixel of a map, raised by its height.
+
+    `v` are its rings, m: any below the map, its lower end, the middles of its rows, its upper end.
+    """
     height = maps.height_m[::-1]
-    height = np.vstack((height[:1], height, height[-1:]))
+    below = len(v) - 1 - len(height)
+    height = np.vstack((np.repeat(height[:1], below, axis=0), height, height[-1:]))
     rings, columns = height.shape
-    v = _rows(maps, low)
+    low = v[below - 1]
     place, side, across = _smooth(path, v)
     angle = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
     out = np.cos(angle)[:, None] * side[:, None] + np.sin(angle)[:, None] * across[:, None]
-    reach = np.maximum(radius[:, None] + height, 0.05 * radius[:, None])
+    reach = np.maximum(radius + height, 0.05 * radius)
     ring = (place[:, None] + reach[..., None] * out).reshape(-1, 3)
     points = np.vstack((ring, place[:1], place[-1:]))
     k, j = np.meshgrid(np.arange(rings - 1), np.arange(columns), indexing="ij")
@@ -244,10 +286,11 @@ def _tube(path: AxisPath, low: float, radius: _Floats, maps: BarkMaps, skeleton:
         )
     )
     turn = np.concatenate((np.tile((one + 0.5) / columns, rings), [np.nan, np.nan]))
-    share = np.concatenate((np.repeat((v - low) / maps.length_m, columns), [0.0, 1.0]))
+    share = np.maximum((v - low) / maps.length_m, 0.0)
+    share = np.concatenate((np.repeat(share, columns), [0.0, 1.0]))
     row = path.rows[path.internode(np.concatenate((np.repeat(v, columns), v[[0, -1]])))]
     known: dict[str, Any] = {
-        "radius_m": np.concatenate((np.repeat(radius, columns), radius[[0, -1]])),
+        "radius_m": np.concatenate((radius.ravel(), radius[[0, -1], 0])),
         "order": skeleton.order[row],
         "birth_year": skeleton.birth_year[row],
         "tree_id": np.full(len(points), skeleton.tree_id),

@@ -84,13 +84,12 @@ def check_threshold(
     material: Material,
     girths: NDArray[np.float64],
     length: NDArray[np.float64],
-    substeps: int,
 ) -> None:
     """Refuse a threshold below the range in which one fracture relieves a ring (3.2.3)."""
     threshold = material.threshold
     if threshold is None or len(girths) < 2:
         return
-    growth = (girths[1:] / girths[:-1]) ** (1.0 / substeps)
+    growth = girths[1:] / girths[:-1]
     bound = fracture_range(material, growth, length)
     if np.any((growth > 1.0) & (threshold <= bound)):
         most = np.unravel_index(np.argmax(bound), bound.shape)

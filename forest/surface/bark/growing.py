@@ -87,13 +87,18 @@ class Bark(BarkView):
         rings = copied(self._rings)
         girths = checked_girths(girth_by_step, len(rings.records), rings.girth)
         spread = checked_dilatation(dilatation, len(girths), rings.edges)
-        check_threshold(self.material, np.vstack([rings.girth, girths]), rings.length, substeps)
+        check_threshold(self.material, np.vstack([rings.girth, girths]), rings.length)
         pace, history = self._pace.copy(), list(self.history)
         time = self.time
         for step, girth in enumerate(girths):
+            # The criterion is the whole step's: its parts only load the bark bit by bit.
+            growth = girth / rings.girth - 1.0
+            np.maximum(growth, FADE * pace, out=pace)
+            threshold = self.material.threshold
+            rings.limit[:] = pace if threshold is None else threshold - 1.0
+            rings.limit[growth <= 0.0] = 0.0
             for part in _parts(rings.girth.copy(), girth, substeps):
-                time_now = time + (part.number / substeps)
-                rings = _advance(self, rings, part.girth, spread(step), pace, substeps, time_now)
+                _advance(self, rings, part, spread(step), substeps, time + part.number / substeps)
             time += 1.0
             if keep:
                 history.append(Snapshot(time, rings.girth.copy(), elements_of(rings)))
@@ -272,26 +277,20 @@ def _parts(
 def _advance(
     bark: Bark,
     rings: Rings,
-    girth: NDArray[np.float64],
+    part: _Part,
     spread: NDArray[np.float64] | None,
-    pace: NDArray[np.float64],
     substeps: int,
     time: float,
-) -> Rings:
+) -> None:
     """Lengthen all strips, solve, and let break what must (figure 8)."""
-    growth = girth / rings.girth - 1.0
-    np.maximum(growth, FADE ** (1.0 / substeps) * pace, out=pace)
-    threshold = bark.material.threshold
-    rings.limit[:] = pace if threshold is None else threshold - 1.0
-    rings.limit[growth <= 0.0] = 0.0
+    girth = part.girth
     edges = _stretched(rings.edges, rings.girth, girth, spread)
-    physics = Physics.of(bark.material, substeps)
+    physics = Physics.of(bark.material, begins=part.number == 1, ends=part.number == substeps)
     worst = np.zeros(len(girth))
     in_threads(stretch_all, rings, physics, girth, edges, worst)
     order = np.argsort(-worst, kind="stable")
     crossings = bark.geometry.crossings
     tear_all(rings, physics, np.int64(bark.seed), crossings, order, time)
-    return rings
 
 
 def _keep_untorn(rings: Rings, before: Rings) -> None:

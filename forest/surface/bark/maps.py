@@ -164,14 +164,12 @@ def bark_maps(
     v = rows_of(outlines.length, rows, outlines.low)
     across = outlines.at(outlines.girth, v) / columns
     along = outlines.length / rows
-    lowest, highest = float(canvas.height.min()), float(canvas.height.max())
-    scale = 65535.0 / max(highest - lowest, 1e-9)
-    raised = (canvas.height - np.float32(lowest)) * np.float32(scale)
+    lowest, highest, raised = quantised(canvas.height)
     wraps = outlines.cyclic
     return BarkMaps(
         colour=canvas.colour,
         normal=normals(canvas.height, across, along, wraps_along=wraps),
-        height=np.clip(np.rint(raised), 0, 65535).astype(np.uint16),
+        height=raised,
         roughness=canvas.roughness,
         occlusion=occlusion(canvas.height, across, along, wraps_along=wraps),
         lowest_m=lowest,
@@ -180,6 +178,14 @@ def bark_maps(
         length_m=outlines.length,
         tileable=wraps,
     )
+
+
+def quantised(height: NDArray[np.float32]) -> tuple[float, float, NDArray[np.uint16]]:
+    """Give the lowest and the highest of heights in m, and all as 16 bits in between."""
+    lowest, highest = float(height.min()), float(height.max())
+    scale = 65535.0 / max(highest - lowest, 1e-9)
+    raised = (height - np.float32(lowest)) * np.float32(scale)
+    return lowest, highest, np.clip(np.rint(raised), 0, 65535).astype(np.uint16)
 
 
 def _paint(

@@ -127,14 +127,17 @@ class Physics(NamedTuple):
     influence: float
     stand_off: float
     stray: float  # tangent
+    begins: bool  # whether this part of a step is its first
+    ends: bool  # or its last
 
     @classmethod
-    def of(cls, material: Material, substeps: int = 1) -> Physics:
-        """Take over what the kernels need in one of the parts of a step."""
+    def of(cls, material: Material, *, begins: bool = True, ends: bool = True) -> Physics:
+        """Take over what the kernels need in a step, or a part of one."""
         same = {name: float(getattr(material, name)) for name in cls._fields if name in _SAME}
-        same["run_m"] /= substeps
         return cls(
             **same,  # type: ignore[arg-type]
+            begins=begins,
+            ends=ends,
             curve_at=material.curve.at,
             curve_value=material.curve.value,
             stray=math.tan(math.radians(material.stray_deg)),

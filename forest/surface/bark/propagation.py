@@ -277,6 +277,8 @@ def tear_all(rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, ti
                 f = rings.tear_fracture[rings.tear[i]]
                 rings.area[f] += rings.open[i] * rings.width[s]
     for f in range(rings.totals[1]):
+        if not physics.ends:
+            break
         run_on(rings, physics, seed, crossings, f, _UP, time)
         run_on(rings, physics, seed, crossings, f, _DOWN, time)
     for s in order:

@@ -188,12 +188,16 @@ def _stretch(rings: Any, physics: Any, girth: Any, edges: Any, s: Any) -> None:
     """Let the substrate below one strip grow, and solve. What fractures had opened, they keep.
 
     The places where vertices are tied move with the substrate; before, they are reset to where
-    the vertices had come to lie (long-term plasticity, 5.1).
+    the vertices had come to lie (long-term plasticity, 5.1). Both happen once a step, however
+    finely it is cut: what yields in a step would else hang on the number of its parts.
     """
     for i in range(rings.base[s], rings.base[s] + rings.records[s]):
-        rings.rest[i] = rings.open[i]
-        rings.grip_left[i] = _carried(rings.edges[s], edges[s], rings.left[i])
-        rings.grip_right[i] = _carried(rings.edges[s], edges[s], rings.left[i] + rings.open[i])
+        if physics.begins:
+            rings.rest[i] = rings.open[i]
+            rings.grip_left[i] = rings.left[i]
+            rings.grip_right[i] = rings.left[i] + rings.open[i]
+        rings.grip_left[i] = _carried(rings.edges[s], edges[s], rings.grip_left[i])
+        rings.grip_right[i] = _carried(rings.edges[s], edges[s], rings.grip_right[i])
     for j in range(len(edges[s])):
         rings.edges[s, j] = edges[s, j]
     rings.girth[s] = girth[s]

@@ -31,10 +31,12 @@ class Forces(NamedTuple):
     step: float
     greatest: float  # longest link
     least: float  # shortest link
+    finest: float  # longest link, in radii of the limb
     spring: float  # between links
     damping: float
     skeleton_spring: float
     skeleton_damping: float
+    speed: float  # of the flow
     steering: float  # rate at which particles turn to their limb, 1/s
     lean_cos: float  # of the angle between grain and limb
     lean_sin: float
@@ -50,6 +52,7 @@ class Chain(NamedTuple):
     off: _Floats  # (n,) distance from the surface that was left after projection
     foot: _Floats  # (n, 3) nearest point of the limb's axis
     heading: _Floats  # (n, 3) of the axis there
+    radius: _Floats  # (n,) of the limb there
     ahead: _Ints  # (n,)
     behind: _Ints  # (n,)
     limb: NDArray[np.int32]  # (n,)
@@ -57,7 +60,6 @@ class Chain(NamedTuple):
     state: NDArray[np.int8]  # (n,)
     mother: _Ints  # (n,) the particle ahead of which it was put in; -1 at the start
     push: _Floats  # (n, 3) scratch
-    straddles: NDArray[np.bool_]  # (n,) whether its loop is on several limbs
     live: _Ints  # (n,) numbers of those that are not gone
     tally: _Ints  # (3,) particles ever, live ones, relinkings
 
@@ -72,6 +74,7 @@ def empty_chain(room: int) -> Chain:
         off=np.zeros(room),
         foot=np.zeros((room, 3)),
         heading=np.zeros((room, 3)),
+        radius=np.zeros(room),
         ahead=ints[0],
         behind=ints[1],
         limb=np.zeros(room, np.int32),
@@ -79,7 +82,6 @@ def empty_chain(room: int) -> Chain:
         state=np.zeros(room, np.int8),
         mother=ints[3],
         push=np.zeros((room, 3)),
-        straddles=np.zeros(room, np.bool_),
         live=ints[4],
         tally=np.zeros(3, np.int64),
     )
@@ -96,7 +98,7 @@ def with_room(chain: Chain, room: int) -> Chain:
 @njit
 def put(surface: Any, chain: Any, i: Any, x: Any, y: Any, z: Any) -> None:
     """Put a particle on the surface; its velocity keeps what is tangential."""
-    x, y, z, nx, ny, nz, off, which = settle(surface.field, x, y, z, chain.cone[i])
+    x, y, z, nx, ny, nz, off, which = settle(surface.field, x, y, z, chain.cone[i], chain.normal[i])
     v = chain.velocity[i]
     across = v[0] * nx + v[1] * ny + v[2] * nz
     v[0] -= across * nx
@@ -107,7 +109,8 @@ def put(surface: Any, chain: Any, i: Any, x: Any, y: Any, z: Any) -> None:
     chain.off[i] = off
     chain.cone[i] = which
     chain.limb[i] = surface.field.cones.axis[which]
-    fx, fy, fz, hx, hy, hz, at_tip = foot(surface, which, x, y, z)
+    fx, fy, fz, hx, hy, hz, radius, at_tip = foot(surface, which, x, y, z)
+    chain.radius[i] = radius
     chain.foot[i, 0], chain.foot[i, 1], chain.foot[i, 2] = fx, fy, fz
     chain.heading[i, 0], chain.heading[i, 1], chain.heading[i, 2] = hx, hy, hz
     if at_tip:
@@ -147,11 +150,10 @@ def _push(chain: Any, forces: Any, i: Any) -> None:
         stretch = chain.place[a, k] + chain.place[b, k] - 2.0 * chain.place[i, k]
         drag = chain.velocity[a, k] + chain.velocity[b, k] - 2.0 * v[k]
         chain.push[i, k] = forces.spring * stretch + forces.damping * drag + hold * n[k]
-    if forces.steering > 0.0 and not chain.straddles[i]:
-        speed = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    if forces.steering > 0.0:
         way = grain_heading(n, chain.heading[i], forces.lean_cos, forces.lean_sin)
         for k in range(3):
-            chain.push[i, k] += forces.steering * (speed * way[k] - v[k])
+            chain.push[i, k] += forces.steering * (forces.speed * way[k] - v[k])
 
 
 @njit
@@ -185,6 +187,7 @@ def _put_between(surface: Any, chain: Any, a: Any, b: Any) -> None:
     chain.mother[m] = a
     for k in range(3):
         chain.velocity[m, k] = 0.5 * (chain.velocity[a, k] + chain.velocity[b, k])
+        chain.normal[m, k] = chain.normal[a, k]
     x = 0.5 * (chain.place[a, 0] + chain.place[b, 0])
     y = 0.5 * (chain.place[a, 1] + chain.place[b, 1])
     z = 0.5 * (chain.place[a, 2] + chain.place[b, 2])
@@ -224,9 +227,10 @@ def _mend_links(surface: Any, chain: Any, forces: Any) -> None:
         square = 0.0
         for k in range(3):
             square += (chain.place[a, k] - chain.place[b, k]) ** 2
-        if square > forces.greatest * forces.greatest:
+        finer = min(1.0, forces.finest * min(chain.radius[a], chain.radius[b]) / forces.greatest)
+        if square > (finer * forces.greatest) ** 2:
             _put_between(surface, chain, a, b)
-        elif square < forces.least * forces.least:
+        elif square < (finer * forces.least) ** 2:
             third = chain.ahead[chain.ahead[b]]
             if third != a and chain.ahead[b] != a:  # more than LEAST_LOOP
                 _take_out(chain, min(a, b), max(a, b))
@@ -259,22 +263,6 @@ def _part(chain: Any, forces: Any) -> None:
 
 
 @njit
-def _mark_straddling(chain: Any) -> None:
-    """Mark the loops that are on several limbs: those are led by momentum alone."""
-    live = chain.live[: chain.tally[1]]
-    for i in live:
-        chain.straddles[i] = False
-    for i in live:
-        if chain.limb[i] == chain.limb[chain.ahead[i]] or chain.straddles[i]:
-            continue
-        chain.straddles[i] = True
-        k = chain.ahead[i]
-        while k != i:
-            chain.straddles[k] = True
-            k = chain.ahead[k]
-
-
-@njit
 def advance(surface: Any, chain: Any, forces: Any, steps: Any) -> Any:
     """Take steps until they are done, the chain is at the tips, or there is no room.
 
@@ -293,6 +281,4 @@ def advance(surface: Any, chain: Any, forces: Any, steps: Any) -> Any:
         _move(surface, chain, forces)
         _mend_links(surface, chain, forces)
         _part(chain, forces)
-        if forces.steering > 0.0:
-            _mark_straddling(chain)
     return steps, flowing

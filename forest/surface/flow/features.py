@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ _Floats = NDArray[np.float64]
 
 #: Limbs thinner than this, in distances of quads, keep no features.
 _THINNEST = 0.5
+#: The chain flows over limbs thicker than this, in radii of the foot; others have their own grain.
+_FLOWING = 0.1
 #: Quads reach a little beyond the points that they must cover.
 _MARGIN = 1.08
 #: Points around a site at which its quad's size is measured: rings and points of each.
@@ -111,16 +113,23 @@ def background(bark: Bark, sites: Sites, half: _Floats) -> Mesh:
 def spots(
     bark: Bark, sites: Sites, half: _Floats, preset: FeaturePreset, rules: Spots, seed: int
 ) -> Mesh:
-    """Put fans of triangles on some sites: the edge on the background, the peak above it."""
+    """Put fans of triangles on some sites: the edge on the background, the peak above it.
+
+    A spot has the outline of a lenticel, a lens across the grain with pointed ends.
+    """
     luck = chances(seed, 10, sites.number)
     has = np.flatnonzero(luck[:, 0] < preset.at(rules.density, sites.age))
     age, n = sites.age[has], len(has)
     turn = 2.0 * math.pi * np.arange(_FAN) / _FAN
-    uneven = 1.0 + 0.3 * np.sin(2.0 * turn + 6.28 * luck[has, 1:2]) * luck[has, 2:3]
-    size = (0.7 + 0.6 * luck[has, 3])[:, None]
-    u = 0.5 * size * preset.at(rules.width_m, age)[:, None] * uneven * np.cos(turn)
-    v = 0.5 * size * preset.at(rules.height_m, age)[:, None] * uneven * np.sin(turn)
-    edge = sites.place[has][:, None] + (
+    uneven = 1.0 + 0.25 * np.sin(2.0 * turn + 6.28 * luck[has, 1:2]) * luck[has, 2:3]
+    size = (0.4 + 1.2 * luck[has, 3] ** 2)[:, None]  # many small, few large
+    lens = np.sin(turn) * np.abs(np.sin(turn))  # two parabolas
+    u = 0.5 * size * preset.at(rules.width_m, age)[:, None] * np.cos(turn)
+    v = 0.5 * np.sqrt(size) * preset.at(rules.height_m, age)[:, None] * uneven * lens
+    bears = preset.at(rules.density, age)
+    shift = (luck[has, 0] / bears - 0.5) * sites.spacing_m  # sites stand in rows, spots do not
+    middle = bark.blend.project(sites.place[has] + shift[:, None] * sites.along[has])
+    edge = middle[:, None] + (
         u[..., None] * sites.across[has][:, None] + v[..., None] * sites.along[has][:, None]
     )
     edge = bark.blend.project(edge.reshape(-1, 3))
@@ -129,13 +138,13 @@ def spots(
     raised = preset.at(rules.raise_m, age)
     low = edge + np.repeat(lift, _FAN)[:, None] * out
     high = edge + np.repeat(lift + raised, _FAN)[:, None] * out
-    top = (
-        sites.place[has]
-        + (lift + raised + preset.at(rules.peak_m, age))[:, None] * sites.normal[has]
+    top = middle + (lift + raised + preset.at(rules.peak_m, age))[:, None] * unit_normals(
+        bark.blend, middle
     )
     points = np.concatenate((top, high, low))
-    around = np.stack((u, v), axis=2) + sites.uv[has][:, None]
-    uv = np.concatenate((sites.uv[has], around.reshape(-1, 2), around.reshape(-1, 2)))
+    here = sites.uv[has] + np.column_stack((np.zeros(n), shift))
+    around = np.stack((u, v), axis=2) + here[:, None]
+    uv = np.concatenate((here, around.reshape(-1, 2), around.reshape(-1, 2)))
     k = np.arange(n)[:, None]
     a = n + k * _FAN + np.arange(_FAN)
     b = n + k * _FAN + (np.arange(_FAN) + 1) % _FAN
@@ -183,9 +192,8 @@ def _layer(
     across = np.cross(step, out)
     across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-12)
     reach = np.linspace(-1.0, 1.0, nodes)
-    taper = np.maximum(1.0 - np.abs(reach) ** 5, 0.1)
-    wobble = 1.0 + 0.25 * np.sin(7.0 * reach[None] + 6.28 * luck[:, 2:3])
-    wide = 0.5 * preset.at(rules.width_m, age)[:, None] * taper * wobble * (0.7 + 0.6 * luck[:, 3:])
+    taper = np.maximum(1.0 - np.abs(reach) ** 3, 0.05)
+    wide = 0.5 * preset.at(rules.width_m, age)[:, None] * taper * (0.6 + 0.8 * luck[:, 3:])
     high = preset.at(rules.height_m, age)[:, None] * rules.layers[layer] * np.sqrt(taper)
     lift = _above_quads(sites, half)[has][:, None]
     columns, texture = [], []
@@ -193,7 +201,9 @@ def _layer(
         np.linalg.norm(np.diff(middle, axis=1, prepend=middle[:, :1]), axis=2), axis=1
     )
     for side, height in ((-1.0, 0.0), (_BEVEL - 1.0, 1.0), (1.0 - _BEVEL, 1.0), (1.0, 0.0)):
-        spread = side * wide
+        phase = 6.28 * luck[:, 2:3] * (3.0 if side > 0.0 else 1.0)
+        uneven = 1.0 + 0.2 * np.sin(6.0 * reach + phase) + 0.1 * np.sin(14.0 * reach + 2.0 * phase)
+        spread = side * wide * uneven
         foot = bark.blend.project((middle + spread[..., None] * across).reshape(-1, 3))
         normal = unit_normals(bark.blend, foot).reshape(n, nodes, 3)
         columns.append(foot.reshape(n, nodes, 3) + (height * high + lift)[..., None] * normal)
@@ -281,7 +291,11 @@ def features(
     blend = Blend.of(limbs_of(skeleton, thinnest_m=_THINNEST * max(spacing, 0.0)))
     trails = None
     if grain_of_flow:
-        trails = flow(blend, rules=replace(FlowRules(), spiral_deg=spiral_deg)).trails
+        thick = limbs_of(
+            skeleton,
+            thinnest_m=max(_THINNEST * spacing, _FLOWING * float(blend.limbs.cones.low[0])),
+        )
+        trails = flow(Blend.of(thick), rules=FlowRules(spiral_deg=spiral_deg)).trails
     bark = Bark(skeleton, blend, trails)
     sites = sites_of(bark, cover(blend, spacing, seed=seed, near=near), year=year, age=age)
     half = quad_sizes(bark, sites)

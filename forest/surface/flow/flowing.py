@@ -40,8 +40,9 @@ _START = 0.1
 class FlowRules:
     """Constants of the chain of particles.
 
-    The defaults are those of Hart & Baker 2003, 5.3, but for `steering` and `readings`, which are
-    ours: ``FlowRules(steering=0.0, readings="paper")`` is the flow as printed.
+    The defaults are those of Hart & Baker 2003, 5.3, but for `steering`, `finest_link` and
+    `readings`, which are ours: ``FlowRules(steering=0.0, finest_link=math.inf, readings="paper")``
+    is the flow as printed.
 
     Attributes
     ----------
@@ -51,6 +52,9 @@ class FlowRules:
         Speed of particles at the start, upward, units/s.
     greatest_link, least_link : float
         Longer links get a new particle, shorter ones lose one; units.
+    finest_link : float
+        Where this times the limb's radius is less than `greatest_link`, links are shorter, both
+        limits in proportion, so that thin limbs part the chain, too. `math.inf`: as printed.
     spring, damping : float
         Between linked particles, 1/s2 and 1/s.
     skeleton_spring, skeleton_damping : float
@@ -59,9 +63,9 @@ class FlowRules:
         Angle of the velocity at the start from upward; positive leans to the right seen from
         outside (a right-handed spiral).
     steering : float
-        Rate at which, in a loop that is on one limb alone, velocities turn to the direction of
-        the limb (leaning by `spiral_deg`), 1/s. 0: momentum alone, as printed; then the flow
-        curls on where it came onto a limb from the side.
+        Rate at which velocities turn to `speed` along the limb that a particle is on (leaning by
+        `spiral_deg`), 1/s. 0: momentum alone, as printed; then springs pull the chain tight
+        and it hangs in crotches, and curls on where it came onto a limb from the side.
     readings : "corrected" or "paper"
         Table 2 with our condition that both parts go around their limbs, or as printed; then a
         particle that steps onto a limb can become a loop of its own.
@@ -77,6 +81,7 @@ class FlowRules:
     speed: float = 2.0
     greatest_link: float = 0.15
     least_link: float = 0.05
+    finest_link: float = 0.6
     spring: float = 100.0
     damping: float = 1.0
     skeleton_spring: float = 100.0
@@ -90,8 +95,8 @@ class FlowRules:
         for name, value in vars(self).items():
             if name == "readings":
                 continue
-            above = name in ("steps_per_s", "speed", "greatest_link", "least_link")
-            if not math.isfinite(value):
+            above = name in ("steps_per_s", "speed", "greatest_link", "least_link", "finest_link")
+            if not math.isfinite(value) and not (name == "finest_link" and value > 0.0):
                 raise InputError(f"{value:g}", where=f"rules.{name}", expected="a finite number")
             if name == "spiral_deg":
                 if not -90.0 < value < 90.0:
@@ -120,10 +125,12 @@ class FlowRules:
             step=1.0 / self.steps_per_s,
             greatest=self.greatest_link * unit_m,
             least=self.least_link * unit_m,
+            finest=self.finest_link,
             spring=self.spring,
             damping=self.damping,
             skeleton_spring=self.skeleton_spring,
             skeleton_damping=self.skeleton_damping,
+            speed=self.speed * unit_m,
             steering=self.steering,
             lean_cos=math.cos(lean),
             lean_sin=math.sin(lean),
@@ -342,10 +349,17 @@ class _Recorder:
         self._limb: list[NDArray[np.int32]] = []
         self._off: list[_Floats] = []
         self._time: list[float] = []
+        self._ended = np.zeros(0, np.bool_)
 
     def take(self, chain: Chain, time_s: float) -> None:
+        if len(self._ended) < len(chain.live):
+            self._ended = np.append(
+                self._ended, np.zeros(len(chain.live) - len(self._ended), np.bool_)
+            )
         live = chain.live[: chain.tally[1]]
-        self._number.append(live.copy())
+        live = live[~self._ended[live]]
+        self._ended[live[chain.state[live] == DONE]] = True
+        self._number.append(live)
         self._place.append(chain.place[live])
         self._limb.append(chain.limb[live])
         self._off.append(chain.off[live])

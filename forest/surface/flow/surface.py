@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
-from forest.surface.blend.field import Blend, cone, gradient, value
+from forest.surface.blend.field import Blend, cone, value
 
 _Floats = NDArray[np.float64]
 
@@ -16,6 +16,8 @@ _Floats = NDArray[np.float64]
 CLOSE = 1e-4
 _NEWTON_STEPS = 12
 _HALVINGS = 30
+#: Step of differences for the slope, m.
+_STEP = 1e-6
 #: Greatest slope that a smooth blend has.
 _STEEPEST = 4.0
 
@@ -77,8 +79,20 @@ def _along_ray(field: Any, x: Any, y: Any, z: Any, which: Any) -> Any:
 
 
 @njit
-def settle(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
+def _slope(field: Any, x: Any, y: Any, z: Any, f: Any, which: Any) -> Any:
+    """Give the function's slope by differences ahead of a point whose value is known."""
+    gx = value(field, x + _STEP, y, z, which)[0] - f
+    gy = value(field, x, y + _STEP, z, which)[0] - f
+    gz = value(field, x, y, z + _STEP, which)[0] - f
+    return gx / _STEP, gy / _STEP, gz / _STEP
+
+
+@njit
+def settle(field: Any, x: Any, y: Any, z: Any, hint: Any, normal: Any) -> Any:
     """Move a point onto the surface by Newton steps along the slope.
+
+    The first step is along `normal`, that of the place which the point comes from. The slope is
+    taken anew only where the last step brought less than three quarters of the way.
 
     Returns
     -------
@@ -86,32 +100,37 @@ def settle(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
         The place (3), the unit normal there (3), how far it still is off, and its cone.
     """
     f, which = value(field, x, y, z, hint)
-    gx, gy, gz = gradient(field, x, y, z, which)
+    gx, gy, gz = normal[0], normal[1], normal[2]
+    stale = gx * gx + gy * gy + gz * gz < 0.5
     for _ in range(_NEWTON_STEPS):
         cones = field.cones
         if abs(f) <= CLOSE * min(cones.low[which], cones.high[which]):
+            off = f
             break
+        if stale:
+            gx, gy, gz = _slope(field, x, y, z, f, which)
         step = f / max(gx * gx + gy * gy + gz * gz, 0.25)
         x, y, z = x - step * gx, y - step * gy, z - step * gz
+        before = abs(f)
         f, which = value(field, x, y, z, which)
-        gx, gy, gz = gradient(field, x, y, z, which)
+        stale = abs(f) > 0.25 * before
     else:  # a crease: slopes lead from one side to the other
         x, y, z, off = _along_ray(field, x, y, z, which)
         f, which = value(field, x, y, z, which)
-        f = min(abs(f), off)  # where the function jumps, the surface is in the jump
-        gx, gy, gz = gradient(field, x, y, z, which)
+        off = min(abs(f), off)  # where the function jumps, the surface is in the jump
+    gx, gy, gz = _slope(field, x, y, z, f, which)
     if gx * gx + gy * gy + gz * gz > _STEEPEST * _STEEPEST:
         _, _, fx, fy, fz, _ = cone(field.cones, which, x, y, z)
         gx, gy, gz = x - fx, y - fy, z - fz
     size = max(np.sqrt(gx * gx + gy * gy + gz * gz), 1e-12)
-    return x, y, z, gx / size, gy / size, gz / size, f, which
+    return x, y, z, gx / size, gy / size, gz / size, off, which
 
 
 @njit
 def foot(surface: Any, which: Any, x: Any, y: Any, z: Any) -> Any:
-    """Give the nearest point on the limb's axis (3), its heading (3), and whether it is a tip."""
+    """Give the nearest point on the limb's axis, its heading, radius, and whether it is a tip."""
     cones = surface.field.cones
-    _, _, fx, fy, fz, t = cone(cones, which, x, y, z)
+    _, radius, fx, fy, fz, t = cone(cones, which, x, y, z)
     lx = cones.end[which, 0] - cones.start[which, 0]
     ly = cones.end[which, 1] - cones.start[which, 1]
     lz = cones.end[which, 2] - cones.start[which, 2]
@@ -119,4 +138,4 @@ def foot(surface: Any, which: Any, x: Any, y: Any, z: Any) -> Any:
     axis = cones.axis[which]
     last = which + 1 == len(cones.axis) or cones.axis[which + 1] != axis
     at_tip = last and t >= 1.0 and surface.free[axis]
-    return fx, fy, fz, lx / size, ly / size, lz / size, at_tip
+    return fx, fy, fz, lx / size, ly / size, lz / size, radius, at_tip
