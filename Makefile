@@ -27,10 +27,11 @@ $(READY): pyproject.toml
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,docs,view]'
 	@touch $@
 
-demo: $(READY)  ## grow the Saxony spruce stand for 60 years, print its table, draw it
+demo: $(READY)  ## grow the Saxony spruce stand for 60 years, print its table, draw and report it
 	@mkdir -p out
 	@$(BIN)/forest run scenarios/saxony_spruce.toml --out out/run.h5 --force
 	@$(BIN)/forest picture out/run.h5 --to out/stand.png --development out/development.png --force
+	@$(BIN)/forest report out/run.h5 --to out/report.html --force
 
 # One process compiles the kernels of an ordinary run before two use them; each test worker then
 # takes a copy of that cache (tests/conftest.py).

@@ -15,6 +15,7 @@ import typer
 from forest.cli.barking import bark
 from forest.cli.describing import species, version
 from forest.cli.exporting import export
+from forest.cli.filming import movie, report
 from forest.cli.growing import check, run, sweep
 from forest.cli.measuring import bucking, measure
 from forest.cli.planting import tree
@@ -62,6 +63,8 @@ for _command in (
     picture,
     view,
     stand_view,
+    movie,
+    report,
     scene,
     tree,
     version,

@@ -169,14 +169,21 @@ def _changed(
             raise InputError(f"--haze is {haze:g}", expected="metres above 0")
         changes["haze"] = replace(scenery.haze, visibility_m=haze)
     if size is not None:
-        sides = size.lower().split("x")
-        whole = len(sides) == 2 and all(side.isascii() and side.isdigit() for side in sides)
-        if not whole or not all(16 <= int(side[:9]) <= 16384 for side in sides):
-            raise InputError(
-                f"--size is {size!r}", expected="WxH, 16 to 16384 pixels each, e.g. 1200x750"
-            )
-        changes["size"] = (int(sides[0]), int(sides[1]))
+        changes["size"] = pixels_of(size)
     return replace(scenery, **changes)
+
+
+def pixels_of(size: str) -> tuple[int, int]:
+    """Read --size: width and height, pixels."""
+    from forest.errors import InputError
+
+    sides = size.lower().split("x")
+    whole = len(sides) == 2 and all(side.isascii() and side.isdigit() for side in sides)
+    if not whole or not all(16 <= int(side[:9]) <= 16384 for side in sides):
+        raise InputError(
+            f"--size is {size!r}", expected="WxH, 16 to 16384 pixels each, e.g. 1200x750"
+        )
+    return int(sides[0]), int(sides[1])
 
 
 def _seen_from(

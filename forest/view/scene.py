@@ -192,9 +192,20 @@ def save(plotter: Any, to: str | Path) -> None:
 
 
 def pixels(plotter: Any) -> NDArray[np.uint8]:
-    """Render and average the fine pixels; gives (height, width, 3)."""
-    fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
+    """Render, close the plotter and average the fine pixels; gives (height, width, 3)."""
+    picture = shoot(plotter)
     plotter.close()
+    return picture
+
+
+def shoot(plotter: Any, *, again: bool = False) -> NDArray[np.uint8]:
+    """Render and average the fine pixels; gives (height, width, 3). The plotter stays open.
+
+    A plotter renders of itself for its first picture; for the others it must be told `again`.
+    """
+    if again:
+        plotter.render()
+    fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
     k = OVERSAMPLING
     height, width = fine.shape[0] // k, fine.shape[1] // k
     mean = fine[: height * k, : width * k, :3].reshape(height, k, width, k, 3).mean(axis=(1, 3))

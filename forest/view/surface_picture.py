@@ -79,9 +79,7 @@ def draw_mesh(
     plotter.remove_all_lights()
     plotter.add_light(import_pyvista().Light(position=light, light_type="scene light"))
     if colour_by == TEXTURE:
-        for mesh, part in zip(meshes, parts, strict=True):
-            if len(mesh.triangles):
-                _add_textured(plotter, mesh, part.material)
+        add_textured(plotter, parts)
     else:
         _add_coloured(plotter, Mesh.together(meshes), colour_by)
     points = np.concatenate([mesh.points for mesh in meshes])
@@ -92,6 +90,14 @@ def draw_mesh(
     picture = Image.fromarray(pixels(plotter))
     with whole_file(to, overwrite=overwrite) as draft:
         picture.save(draft)
+
+
+def add_textured(plotter: Any, parts: Sequence[Part]) -> None:
+    """Put parts into a plotter as they look, each in its material."""
+    for part in parts:
+        mesh = part.placed()
+        if len(mesh.triangles):
+            _add_textured(plotter, mesh, part.material)
 
 
 def _add_coloured(plotter: Any, mesh: Mesh, colour_by: str) -> None:

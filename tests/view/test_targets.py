@@ -31,6 +31,8 @@ COMMANDS = {
     "rings": ("rings", "RUN", "--tree", "1", "--to", "a.png"),
     "picture": ("picture", "RUN", "--to", "a.png"),
     "stand-view": ("stand-view", "RUN", "--to", "a.png"),
+    "movie": ("movie", "RUN", "--to", "a.gif"),
+    "report": ("report", "RUN", "--to", "a.html"),
     "stability": ("stability", "RUN", "--to", "a.csv"),
     "measure": ("measure", "RUN", "--to", "a.csv"),
     "bucking": ("bucking", "RUN", "--to", "a.csv"),
