@@ -24,7 +24,9 @@ def view(
     host: Annotated[
         str, typer.Option(help="Name of this machine that is listened on: loopback names only.")
     ] = "127.0.0.1",
-    browser: Annotated[bool, typer.Option(help="Whether to open the page in a browser.")] = True,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only say where the page is.")
+    ] = False,
     session: Annotated[
         Path | None,
         typer.Option(
@@ -58,9 +60,9 @@ def view(
     import_trame()
     free = free_port(host, port)
     if live:
-        _view_live(file, session or Path(f"{file.stem}.session.toml"), host, free, browser)
+        _view_live(file, session or Path(f"{file.stem}.session.toml"), host, free, not no_browser)
     else:
-        _view_run(file, host, free, browser)
+        _view_run(file, host, free, not no_browser)
     typer.echo("forest view: closed")
 
 

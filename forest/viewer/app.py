@@ -157,15 +157,15 @@ class App:
         self.stage.recolour(self.colours)
         self.refresh()
 
-    def choose(self, tree_id: int | None) -> None:
-        """Choose a tree, or none."""
+    def choose(self, tree_id: int | None, *, card: bool = True) -> None:
+        """Choose a tree, or none; turn to its card, unless told otherwise."""
         self.state.chosen = tree_id
         if tree_id is None:
             self.state.alone = False
         self.stage.choose(tree_id)
         if self.state.alone:
             self.show_year()
-        if tree_id is not None:
+        if tree_id is not None and card:
             self.state.tab = "tree"
         self.refresh()
 

@@ -112,5 +112,4 @@ class PlanPanel:
         # A stem that is clicked on is meant, whatever crown spreads above it.
         near = under[away[under] <= 0.008 * max(width, depth)]
         row = near[np.argmin(away[near])] if len(near) else under[np.argmax(height[under])]
-        app.choose(int(trees["tree_id"].iloc[row]))
-        app.state.tab = "map"
+        app.choose(int(trees["tree_id"].iloc[row]), card=False)
