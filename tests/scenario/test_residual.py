@@ -53,7 +53,7 @@ BAD = [
     ("x_m = 0.5\ny_m = 9", "x_m = 5\ny_m = 5", "residual_trees[1]: stands on the spot of"),
     ("fagus_s", "fagus_z", "residual_trees[1].like: unknown species 'fagus_zylvatica', did you"),
     ('["old"]', '["odl"]', "acts[0].residual: no residual tree 'odl', did you mean 'old'?"),
-    ('residual = ["old"]', "", "acts[0].tree_ids: missing; expected tree_ids or residual"),
+    ('residual = ["old"]', "", "acts[0].tree_ids: missing; expected tree_ids, marked or residual"),
     ('["old"]\n', f'["old"]\n{AGAIN}', "acts[1].residual: 'old' is felled by acts[0] in 2004"),
 ]
 
