@@ -64,6 +64,4 @@ def test_ornaments(scripts, tmp_path: Path) -> None:
     points = session.laid
     whole = points[points[:, 2] > 0.6]  # rows, not the stem
     image = whole * [-1, 1, 1] + [12, 0, 0]
-    assert {tuple(p) for p in whole.tolist()} != set()
-    middle = np.abs(whole[:, 0] - 6.0).max() - np.abs(image[:, 0] - 6.0).max()
-    assert abs(middle) < 1e-9
+    assert {tuple(p) for p in whole.tolist()} == {tuple(p) for p in image.tolist()}
