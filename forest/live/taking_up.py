@@ -82,5 +82,5 @@ def _replay(
 
 def _keys(act: Act) -> dict[str, Any]:
     """Give what an act says, without its time."""
-    told = act.model_dump(mode="json", exclude_defaults=True, exclude=set(_TIME))
+    told = act.model_dump(mode="json", exclude_none=True, exclude=set(_TIME))
     return {**told, "kind": act.kind}

@@ -55,12 +55,11 @@ class LiveTool:
 
     def _toggle(self, keys: dict[str, Any]) -> None:
         """Queue an act, or take it back if it waits."""
-        pending = self.desk.source.session.pending
-        if keys in pending:
-            number = pending.index(keys)
-            self.desk.do(lambda session: session.undo(number))
-        else:
-            self.desk.act(**keys)
+        for number, act in enumerate(self.desk.source.pending):
+            if all(act.get(key) == value for key, value in keys.items()):
+                self.desk.do(lambda session, number=number: session.undo(number))
+                return
+        self.desk.act(**keys)
 
 
 class FellTool(LiveTool):

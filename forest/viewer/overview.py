@@ -59,6 +59,9 @@ class StandPanel:
         """Draw it for the year that is shown."""
         app = self._app
         stand, year = app.source.stand, app.year
+        if not len(stand):
+            app.state.stand_html = '<div class="quiet">No year is grown yet.</div>'
+            return
         kind = stand["species"].astype(str)
         whole = stand[kind == "all"]
         years = [int(each) for each in whole["year"]]

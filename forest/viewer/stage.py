@@ -155,7 +155,7 @@ class Stage:
         self._mesh = pv.PolyData()
         if len(bodies.triangles):
             self._mesh = pv.PolyData.from_regular_faces(bodies.points, bodies.triangles)
-        self._mesh.point_data["rgb"] = np.zeros((self._mesh.n_points, 3), np.uint8)
+            self._mesh.point_data["rgb"] = np.zeros((self._mesh.n_points, 3), np.uint8)
         self.plotter.remove_actor("bodies", render=False)
         if len(bodies.triangles):
             self._add(self._mesh, "bodies", scalars="rgb", rgb=True, culling="back")

@@ -172,12 +172,10 @@ class WorkPanel:
         )
 
     def refresh(self) -> None:
-        """List the acts that wait, if no year grows."""
-        if self._desk.source.lock.locked():
-            return
-        pending = self._desk.source.session.pending
+        """List the acts that wait."""
         self._desk.app.state.live_acts = [
-            {"number": k, "text": words_of(act)} for k, act in enumerate(pending)
+            {"number": k, "text": words_of(act)}
+            for k, act in enumerate(self._desk.source.pending)
         ]
         for options in self._options:
             options.refresh()
