@@ -83,6 +83,10 @@ class Desk:
             )
         self.do(lambda session: session.act(**keys))
 
+    def undo(self, number: int) -> None:
+        """Take back an act that waits, by its place among them; raises as `do` does."""
+        self.do(lambda session: session.undo(number))
+
     def finish(self) -> None:
         """Do what still waits, when the page is closed for good."""
         waiting, self._waiting = self._waiting, []

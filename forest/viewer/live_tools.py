@@ -57,7 +57,7 @@ class LiveTool:
         """Queue an act, or take it back if it waits."""
         for number, act in enumerate(self.desk.source.pending):
             if all(act.get(key) == value for key, value in keys.items()):
-                self.desk.do(lambda session, number=number: session.undo(number))
+                self.desk.undo(number)
                 return
         self.desk.act(**keys)
 

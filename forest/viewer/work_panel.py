@@ -78,7 +78,9 @@ class WorkPanel:
 
         self._build_years(v, html)
         for options in self._options:
-            with html.Div(v_if=(f"tool === '{options.tool}'",), id=f"options-{options.tool}"):
+            with html.Div(
+                v_if=(f"tool === '{options.tool}'",), classes="mt-3", id=f"options-{options.tool}"
+            ):
                 options.build(v, html)
         self._build_acts(v, html)
         html.H3("Session")
@@ -174,17 +176,13 @@ class WorkPanel:
     def refresh(self) -> None:
         """List the acts that wait."""
         self._desk.app.state.live_acts = [
-            {"number": k, "text": words_of(act)}
-            for k, act in enumerate(self._desk.source.pending)
+            {"number": k, "text": words_of(act)} for k, act in enumerate(self._desk.source.pending)
         ]
         for options in self._options:
             options.refresh()
 
     def _undo(self, number: int) -> None:
-        def take_back(session: LiveSession) -> None:
-            session.undo(int(number))
-
-        self._desk.app.tried(lambda: self._desk.do(take_back))
+        self._desk.app.tried(lambda: self._desk.undo(int(number)))
 
     def _save(self) -> None:
         """Write a run file, beside the session's where no folder is named."""
@@ -192,6 +190,10 @@ class WorkPanel:
         to = name if name.is_absolute() else self._file.parent / name
 
         def write(session: LiveSession) -> None:
+            if to.suffix != ".h5":
+                raise InputError(
+                    f"{to.name} is no run file's name", expected="one that ends in .h5"
+                )
             if to.exists():
                 raise InputError("exists already", where=str(to), expected="a new name")
             session.write_run(to)
