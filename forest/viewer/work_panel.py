@@ -97,7 +97,9 @@ class WorkPanel:
                 hide_details=True,
                 id="run-file",
             )
-            v.VBtn("Save", variant="text", click="trigger('save_run')", id="save-run")
+            v.VBtn(
+                "Save", variant="text", click="trigger('save_run', [live_run_file])", id="save-run"
+            )
         html.Div("{{ live_saved }}", classes="quiet mt-1", id="saved")
 
     def _build_years(self, v: Any, html: Any) -> None:
@@ -184,9 +186,9 @@ class WorkPanel:
     def _undo(self, number: int) -> None:
         self._desk.app.tried(lambda: self._desk.undo(int(number)))
 
-    def _save(self) -> None:
+    def _save(self, words: Any) -> None:
         """Write a run file, beside the session's where no folder is named."""
-        name = Path(str(self._desk.app.state.live_run_file).strip() or "session.h5")
+        name = Path(str(words).strip() or "session.h5")
         to = name if name.is_absolute() else self._file.parent / name
 
         def write(session: LiveSession) -> None:

@@ -119,6 +119,8 @@ def _a_branch(page: Any) -> tuple[float, float, int, int]:
             tree, serial, metamers = (int(number) for number in said[0])
             if serial > 0 and metamers > 1:
                 return across, down, tree, serial
+            _click(page, 0.03, 0.2)  # the sky: nothing is lit
+            page.wait_for_timeout(120)
     raise AssertionError("no branch was met")
 
 
@@ -164,6 +166,11 @@ def test_trees_are_felled_and_marked_and_acts_taken_back(page: Any, kept: Kept) 
     page.fill("#fell-ids", "1 2")
     page.click("#fell-list")
     wait_for_text(page, "#panel-work", "fell trees 1, 2")
+    page.click("#undo")
+    wait_for_text(page, "#panel-work", "Nothing waits")
+    page.fill("#fell-value", "2000")
+    page.click("#fell-rule-go")
+    wait_for_text(page, "#panel-work", "thin below, n_ha 2000")
     page.click("#undo")
     wait_for_text(page, "#panel-work", "Nothing waits")
     page.fill("#fell-ids", "1, 99")
