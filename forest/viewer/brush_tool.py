@@ -50,6 +50,7 @@ class BrushTool(BranchTool):
                 "brush_shift_x": 2,
                 "brush_shift_y": 0,
                 "brush_copies": 3,
+                "brush_strokes": [],
             }
         )
         self._plane: WorkingPlane | None = None
@@ -185,3 +186,13 @@ class BrushTool(BranchTool):
             number_field(v, "brush_shift_x", "Shift along x, m", step=0.5)
             number_field(v, "brush_shift_y", "Shift along y, m", step=0.5)
             number_field(v, "brush_copies", "Copies", min=1)
+        with html.Div(v_for="each in brush_strokes", key="each", classes="quiet"):
+            html.Span("{{ each }}")
+
+    def refresh(self) -> None:
+        """Say how much of each stroke is colonised."""
+        said = []
+        for row in self.desk.source.strokes.itertuples():
+            taken = "" if row.colonised < 0 else f", {row.colonised} colonised"
+            said.append(f"Stroke {row.stroke} of {row.year}: {row.laid} markers{taken}")
+        self.state.brush_strokes = said

@@ -63,19 +63,17 @@ def draw_brush(stage: Stage, name: str, path: Points, radius: Points, colour: st
     stage.put(name, add)
 
 
-def draw_boxes(stage: Stage, name: str, boxes: list[tuple[Points, Points, str]]) -> None:
-    """Draw boxes, given by their lower and upper corner, m, and their colour."""
-    pv = import_pyvista()
+def draw_surfaces(stage: Stage, name: str, surfaces: list[Any], colour: str) -> None:
+    """Draw pyvista meshes, half transparent, with their sharp edges."""
 
     def add(plotter: Any) -> None:
-        for low, high, colour in boxes:
-            bounds = [float(x) for pair in zip(low, high, strict=True) for x in pair]
-            box = pv.Box(bounds)
-            plotter.add_mesh(box, color=colour, opacity=0.55, **_PLAIN)
-            edges = box.extract_all_edges()
-            plotter.add_mesh(edges, color=colour, line_width=2, **_PLAIN)
+        for surface in surfaces:
+            plotter.add_mesh(surface, color=colour, opacity=0.55, **_PLAIN)
+            edges = surface.extract_feature_edges(30.0)
+            if edges.n_points:
+                plotter.add_mesh(edges, color=colour, line_width=2, **_PLAIN)
 
-    stage.put(name, add if boxes else None)
+    stage.put(name, add if surfaces else None)
 
 
 def draw_rings(stage: Stage, name: str, rings: list[tuple[float, float, float, str]]) -> None:
