@@ -12,6 +12,8 @@ from forest.viewer.stage import Stage
 
 Points = NDArray[np.float64]
 
+_RING_M = 0.07  # how wide a ring is
+
 _PLAIN: dict[str, Any] = {
     "lighting": False,
     "reset_camera": False,
@@ -77,13 +79,13 @@ def draw_surfaces(stage: Stage, name: str, surfaces: list[Any], colour: str) -> 
 
 
 def draw_rings(stage: Stage, name: str, rings: list[tuple[float, float, float, str]]) -> None:
-    """Draw rings on the ground: x, y, radius, m, and the colour of each."""
+    """Draw rings on the ground: x, y, outer radius (0.1 or more), m, and the colour of each."""
     pv = import_pyvista()
 
     def add(plotter: Any) -> None:
         for colour in sorted({ring[3] for ring in rings}):
             parts = [
-                pv.Disc(center=(x, y, 0.03), inner=0.72 * size, outer=size, c_res=24)
+                pv.Disc(center=(x, y, 0.03), inner=size - _RING_M, outer=size, c_res=32)
                 for x, y, size, own in rings
                 if own == colour
             ]
