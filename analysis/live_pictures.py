@@ -1,7 +1,7 @@
 """Pictures of a live stand for docs/viewer.md: `python analysis/live_pictures.py`.
 
-It starts `forest view` on a small scenario of its own, works on the stand in a headless Chromium as a
-user does, and saves what is seen in docs/gallery.
+It starts `forest view` on scenarios, works on their stands in a headless Chromium as a user does,
+and saves what is seen in docs/gallery.
 """
 
 from __future__ import annotations
@@ -34,8 +34,12 @@ start_year = 2001
 mode = "paper"
 plot = { size_m = [4, 4], boundary = "open" }
 environment = { markers = { everywhere = false, release = false, spacing_m = 0.12 } }
-species = { generic_deciduous = { architecture = { internode_length_m = 0.1, max_metamers_per_shoot = 3 }, bud_fate = { alpha = 2.0, apical_bias = 0.52 }, shoots = { light_weight = 0.6, tropism_weight = 0.05 }, wood = { pipe_exponent = 2.3, twig_diameter_m = 0.005 } } }
 planting = { kind = "explicit", trees = [{ x_m = 2.0, y_m = 2.0 }] }
+[species.generic_deciduous]
+architecture = { internode_length_m = 0.1, max_metamers_per_shoot = 3 }
+bud_fate = { alpha = 2.0, apical_bias = 0.52 }
+shoots = { light_weight = 0.6, tropism_weight = 0.05 }
+wood = { pipe_exponent = 2.3, twig_diameter_m = 0.005 }
 """
 
 
@@ -124,15 +128,15 @@ def _stroke(page: Any, radius_m: float, places: list[tuple[float, float]]) -> No
 
 def work_in_a_stand(page: Any) -> None:
     """Thin by rule, fell and mark."""
-    _grow(page, 25)
+    _grow(page, 20)
     page.click("button[title='Fell']")
     page.wait_for_timeout(1500)
-    page.fill("#fell-value", "1500")
+    page.fill("#fell-value", "1800")
     page.keyboard.press("Tab")
     page.wait_for_timeout(500)
     page.click("#fell-rule-go")
     page.wait_for_timeout(3000)
-    page.click("#look-above")
+    page.click("#look-stand")
     shoot(page, "live_stand")
 
 

@@ -12,7 +12,7 @@ from forest.viewer.stage import Stage
 
 Points = NDArray[np.float64]
 
-_RING_M = 0.07  # how wide a ring is
+_RING_M = 0.07  # least width of a ring
 
 _PLAIN: dict[str, Any] = {
     "lighting": False,
@@ -85,7 +85,12 @@ def draw_rings(stage: Stage, name: str, rings: list[tuple[float, float, float, s
     def add(plotter: Any) -> None:
         for colour in sorted({ring[3] for ring in rings}):
             parts = [
-                pv.Disc(center=(x, y, 0.03), inner=size - _RING_M, outer=size, c_res=32)
+                pv.Disc(
+                    center=(x, y, 0.03),
+                    inner=size - max(_RING_M, 0.06 * size),
+                    outer=size,
+                    c_res=32,
+                )
                 for x, y, size, own in rings
                 if own == colour
             ]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from forest.scenario.model import Box, Obstacle
 from forest.view.scene import import_pyvista
@@ -29,13 +30,13 @@ _MOST_POINTS = 60_000
 
 
 def draw_pending(stage: Stage, source: LiveSource) -> None:
-    """Draw rings around trees that acts will touch, places of seedlings, and markers of strokes."""
-    rings = []
-    trees = source.living
-    for x, y, radius, pending in zip(
-        trees["x_m"], trees["y_m"], trees["crown_radius_m"], trees["pending"], strict=True
-    ):
-        kinds = str(pending).split(",") if pending else []
+    """Draw what acts will touch: trees in a colour and with rings, seedlings, markers of strokes."""
+    rings, tints = [], {}
+    trees = source.living[source.living["pending"] != ""]
+    columns = ("tree_id", "x_m", "y_m", "crown_radius_m", "pending")
+    for tree_id, x, y, radius, pending in zip(*(trees[c] for c in columns), strict=True):
+        kinds = str(pending).split(",")
+        tints[int(tree_id)] = to_rgb(_COLOURS.get(kinds[-1], _BOX))
         for k, kind in enumerate(kinds):
             size = (max(float(np.nan_to_num(radius)), 0.15) + 0.15) * (1.0 + 0.35 * k)
             rings.append((float(x), float(y), size, _COLOURS.get(kind, _BOX)))
@@ -43,6 +44,7 @@ def draw_pending(stage: Stage, source: LiveSource) -> None:
         if act["kind"] == "plant":
             places = zip(act.get("x_m", ()), act.get("y_m", ()), strict=True)
             rings += [(float(x), float(y), 0.2, _COLOURS["plant"]) for x, y in places]
+    stage.tints = tints
     draw_rings(stage, "pending", rings)
     for name, points, colour in (
         ("markers to come", source.markers_to_come, _MARKERS),

@@ -37,7 +37,11 @@ def words_of(act: dict[str, Any]) -> str:
     if kind == "stroke":
         only = f", metamer {act['metamer']} alone grows" if act.get("metamer") is not None else ""
         return f"stroke of {len(act['points_m'])} points{only}"
-    rule = (f"{key} {value}" for key, value in act.items() if key not in ("kind", "method"))
+    rule = (
+        f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}"
+        for key, value in act.items()
+        if key not in ("kind", "method")
+    )
     return f"{kind} {act.get('method', '')}, {', '.join(rule)}".replace(" ,", ",")
 
 

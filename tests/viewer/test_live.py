@@ -330,6 +330,11 @@ def test_strange_sessions_are_refused_and_stay(kept: Kept, tmp_path: Path) -> No
     assert (code, out) == (2, "")
     assert "not a session of this scenario" in err and err.count("\n") == 1
     assert kept.session.read_text() == text
+    copy = tmp_path / "copy.toml"
+    copy.write_text(other.read_text())  # the same scenario, but no session
+    code, _, err = forest("view", other, "--session", copy, "--no-browser")
+    assert code == 2 and "is no live session" in err
+    assert copy.read_text() == other.read_text()
     code, _, err = forest("view", other, "--session", other, "--no-browser")
     assert code == 2 and "itself" in err
     code, _, err = forest("view", "run.h5", "--session", other, "--no-browser")
