@@ -30,7 +30,7 @@ _MOST_POINTS = 60_000
 
 
 def draw_pending(stage: Stage, source: LiveSource) -> None:
-    """Draw what acts will touch: trees in a colour and with rings, seedlings, markers of strokes."""
+    """Draw what acts will do: trees in a colour and with rings, seedlings, markers of strokes."""
     rings, tints = [], {}
     trees = source.living[source.living["pending"] != ""]
     columns = ("tree_id", "x_m", "y_m", "crown_radius_m", "pending")
