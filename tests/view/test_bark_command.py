@@ -119,7 +119,7 @@ def test_a_parametric_tree_and_a_tile(tmp_path: Path) -> None:
         (("--parametric", "quaking_aspen", "--to", "x.glb", "--kind", "cone"), "unknown kind"),
         (("--parametric", "quaking_aspen", "--to", "x.glb", "--tile"), "a folder"),
         (("--parametric", "quaking_aspen", "--to", "x.png", "--cell", 0.1), "--cell"),
-        (("--parametric", "quaking_aspen", "--to", "x", "--height", -1), "--height -1"),
+        (("--parametric", "quaking_aspen", "--to", "x", "--height", -1), "--height is -1"),
         (("--parametric", "quaking_aspen", "--to", "x", "--year", 3), "for a run"),
         (("--parametric", "quaking_aspen", "--to", "x", "--model", "flow"), "flow with --to"),
     ],
