@@ -141,8 +141,8 @@ def bark(
     girths = None if history is None else read_girths(history)
     chosen = _tree(run_file, tree, parametric, year, seed)
     wood = None if shrink or girths is not None else chosen.wood
-    known = girths[0] if girths is not None else None if wood is None else wood.years
-    choices.check_years(known)
+    years = None if wood is None else wood.years
+    choices.check_years(years if girths is None else girths[0])
     if model == "flow":
         _write_flow(chosen, preset, year, seed, choices)
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -41,24 +40,22 @@ def read_girths(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.float
         raise InputError(refusal.what, expected=refusal.expected) from None
     found = []
     for line, row in rows:
-        values = [_value(row[column], column, f"{path} line {line}") for column in _COLUMNS]
-        found.append((line, *values))
-    if len(found) < 2:
-        raise InputError("holds one year", where=str(path), expected="two or more")
-    for (_, year, girth), (line, next_year, next_girth) in pairwise(found):
-        if next_year <= year:
+        where = f"{path} line {line}"
+        year, girth = (_value(row[column], column, where) for column in _COLUMNS)
+        if found and year <= found[-1][0]:
             raise InputError(
-                f"year {next_year:g} after {year:g}",
-                where=f"{path} line {line}",
-                expected="years that rise",
+                f"year {year:g} after {found[-1][0]:g}", where=where, expected="years that rise"
             )
-        if next_girth < girth:
+        if found and girth < found[-1][1]:
             raise InputError(
-                f"girth_cm {next_girth:g} after {girth:g}",
-                where=f"{path} line {line}",
+                f"girth_cm {girth:g} after {found[-1][1]:g}",
+                where=where,
                 expected="girths that do not fall",
             )
-    _, years, girths = np.array(found).T
+        found.append((year, girth))
+    if len(found) < 2:
+        raise InputError("holds one year", where=str(path), expected="two or more")
+    years, girths = np.array(found).T
     return years, 0.01 * girths
 
 
