@@ -64,13 +64,18 @@ def test_whatever_crosses_is_closed(seed: int, n: int) -> None:
     long = skeleton.length > 1e-9
     if not long.any():
         return
-    sound(blended(skeleton, cell_m=0.5 * skeleton.radius[long].max()))
+    try:
+        mesh = blended(skeleton, cell_m=0.39 * skeleton.radius[long].max())
+    except InputError as error:
+        assert "grows from its base" in str(error)  # straight down
+        return
+    sound(mesh)
 
 
 def test_volume_goes_to_that_of_the_cone() -> None:
     errors = [
-        STEM_M3 - blended(stem(), cell_m=0.05 / k, flare=None, cells_in_radius=2.0 * k).volume
-        for k in (1, 2, 4)
+        STEM_M3 - blended(stem(), cell_m=0.1 / k, flare=None, cells_in_radius=k).volume
+        for k in (3.0, 6.0, 12.0)
     ]
     assert abs(errors[0]) < 0.03 * STEM_M3
     assert errors[1] < 0.35 * errors[0] and errors[2] < 0.35 * errors[1]  # as the cell's square
@@ -78,11 +83,13 @@ def test_volume_goes_to_that_of_the_cone() -> None:
 
 def test_joint_has_no_crease() -> None:
     skeleton = branching(55.0, half=0.4)
-    smooth = blended(skeleton, cell_m=0.008, flare=None, cells_in_radius=10.0)
+    coarse = blended(skeleton, cell_m=0.01, flare=None, cells_in_radius=10.0)
+    smooth = blended(skeleton, cell_m=0.006, flare=None, cells_in_radius=10.0)
     limb = dataclasses.replace(skeleton, parent=np.array([-1, 0, -1], np.int32))
     with pytest.warns(CrossingWarning, match="0 and 1"):  # they share no joint
         plain = blended(limb, cell_m=0.008, flare=None, cells_in_radius=10.0)
-    assert greatest_turn(smooth, 0.2, 0.7) < 40.0
+    turn = greatest_turn(smooth, 0.2, 0.7)
+    assert turn < 50.0 and turn < 0.75 * greatest_turn(coarse, 0.2, 0.7)
     assert greatest_turn(plain, 0.2, 0.7) > 80.0
 
 
@@ -162,10 +169,10 @@ def test_crossing_limbs_are_told() -> None:
         [True, True, False, True, False],
     )
     with pytest.warns(CrossingWarning, match="1 and 2"):
-        mesh = blended(crossing, cell_m=0.015)
+        mesh = blended(crossing, cell_m=0.012)
     assert mesh.is_watertight and mesh.genus().tolist() == [1]
     with pytest.raises(InputError, match="cross"):
-        blended(crossing, cell_m=0.015, strict=True)
+        blended(crossing, cell_m=0.012, strict=True)
 
 
 def test_a_surface_left_open_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,7 +183,7 @@ def test_a_surface_left_open_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(whole_module, "march", torn)
     where = r"^cell_m: the surface stays open at 3 edges, the first near .* m; expected"
     with pytest.raises(InputError, match=where):
-        blended(stem(), cell_m=0.05, flare=None)
+        blended(stem(), cell_m=0.04, flare=None)
 
 
 def test_limbs_that_touch_without_crossing_are_told() -> None:
@@ -184,17 +191,17 @@ def test_limbs_that_touch_without_crossing_are_told() -> None:
     ring = [(0.4 * float(np.sin(a)), 0.0, 0.4 - 0.4 * float(np.cos(a))) for a in turns]
     loop = tree(list(range(-1, 12)), [(0.0, 0.0, -0.5), *ring], [0.05] * 13, [True] * 13)
     with pytest.warns(CrossingWarning, match="a handle, though no axes cross"):
-        mesh = blended(loop, cell_m=0.025, flare=None)
+        mesh = blended(loop, cell_m=0.02, flare=None)
     assert mesh.is_watertight and mesh.genus().tolist() == [1]
     with pytest.raises(InputError, match="no axes cross"):
-        blended(loop, cell_m=0.025, flare=None, strict=True)
+        blended(loop, cell_m=0.02, flare=None, strict=True)
 
 
 def test_what_is_thick_but_has_no_length_needs_smaller_cells() -> None:
     knob = tree([-1, 0], [(0, 0, 0), (0, 0, 0), (0, 0, 1)], [0.1, 0.03], [True, True])
     with pytest.raises(InputError, match=r"thickest internode has a radius of 0\.03 m"):
-        blended(knob, cell_m=0.05)
-    sound(blended(knob, cell_m=0.015))
+        blended(knob, cell_m=0.03)
+    sound(blended(knob, cell_m=0.012))
 
 
 def test_what_has_no_surface_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -202,8 +209,8 @@ def test_what_has_no_surface_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
     none = {f.name: getattr(whole, f.name)[:0] for f in dataclasses.fields(whole)[:9]}
     with pytest.raises(InputError, match="without internodes"):
         blended(dataclasses.replace(whole, **none))
-    with pytest.raises(InputError, match="radius 0 m"):
-        blended(dataclasses.replace(whole, radius=np.array([0.1, 0.0, 0.1])))
+    with pytest.raises(InputError, match=r"radius -0\.1 m"):
+        blended(dataclasses.replace(whole, radius=np.array([0.1, -0.1, 0.1])))
     with pytest.raises(InputError, match="not a number"):
         blended(dataclasses.replace(whole, end=whole.end * np.nan))
     with pytest.raises(InputError, match="cell_m"):
@@ -212,6 +219,6 @@ def test_what_has_no_surface_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
         blended(whole, cell_m=-1.0)
     with pytest.raises(InputError, match="no internode has a length"):
         blended(dataclasses.replace(whole, start=0.0 * whole.start, end=0.0 * whole.end))
-    monkeypatch.setattr(cells_module, "free_memory", lambda: 2.0**30)
+    monkeypatch.setattr(cells_module, "free_memory", lambda: 2.0**28)
     with pytest.raises(InputError, match=r"GiB of memory.*cells of about"):
         blended(whole, cell_m=0.0005, cells_in_radius=50.0)

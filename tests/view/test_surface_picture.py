@@ -65,7 +65,7 @@ def test_meshes_at_the_end_may_be_blended(
     def blend(skeleton: Skeleton) -> Mesh:
         if skeleton.tree_id == refused:
             raise InputError("no memory")
-        return whole(skeleton, cell_m=0.005)
+        return whole(skeleton, cell_m=0.004)
 
     monkeypatch.setattr(tree_mesh, "blended", blend)
     said: list[str] = []
@@ -138,10 +138,10 @@ def test_the_command_blends_as_it_is_told(
     ]
     to, volumes = tmp_path / "tree.ply", set()
     for words, same in said:
-        given = ("--year", "2004", "--cell", "0.012", "--to", to, "--force", *words)
+        given = ("--year", "2004", "--cell", "0.0095", "--to", to, "--force", *words)
         assert forest("mesh", run_file, "--tree", "1", *given)[0] == 0
         volume = trimesh.load(to).volume
-        assert volume == pytest.approx(blended(tree, cell_m=0.012, **same).volume, rel=1e-6)
+        assert volume == pytest.approx(blended(tree, cell_m=0.0095, **same).volume, rel=1e-6)
         volumes.add(round(volume, 8))
     assert len(volumes) == len(said), volumes
 

@@ -4,6 +4,7 @@ from forest.surface.blend.cones import Reaction
 from forest.surface.blend.crossings import crossings
 from forest.surface.blend.field import Blend, OnLimb
 from forest.surface.blend.foot import Flare
+from forest.surface.blend.odd import GapWarning
 from forest.surface.blend.reaction import reaction_wood
 from forest.surface.blend.whole import CrossingWarning, blend_of, blended
 
@@ -11,6 +12,7 @@ __all__ = [
     "Blend",
     "CrossingWarning",
     "Flare",
+    "GapWarning",
     "OnLimb",
     "Reaction",
     "blend_of",

@@ -25,11 +25,11 @@ from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
 _Keys = NDArray[np.int64]
 
 #: A cell is at most this part of the radius of a limb whose surface may pass it.
-CELLS_IN_RADIUS = 3.0
+CELLS_IN_RADIUS = 4.0
 #: The greatest slope of the field that cells reckon with; raised where the mesh is not closed.
 SLOPE = 1.3
 #: Bytes that a cell takes while its surface is made.
-BYTES_PER_CELL = 3000
+BYTES_PER_CELL = 700
 _CHUNKS = 64
 _BITS = 21
 _MASK = (1 << _BITS) - 1
@@ -164,21 +164,18 @@ def _thinnest(field: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
 def _judge(
     first: Any, step: Any, field: Any, centre: Any, reach: Any, slope: Any, near: Any, thin: Any
 ) -> None:
-    """Tell which cells the surface may pass, and how thin the thinnest limb there is."""
+    """Tell which cells the surface may pass, and, if asked, how thin the thinnest limb there is."""
     for c in range(first, _CHUNKS, step):
         hint = np.int64(0)
         for i in range(len(centre) * c // _CHUNKS, len(centre) * (c + 1) // _CHUNKS):
             p = centre[i]
             f, hint = value(field, p[0], p[1], p[2], hint)
             near[i] = abs(f) <= slope * reach
-            if near[i]:
+            if near[i] and len(thin):
                 thin[i] = _thinnest(field, p[0], p[1], p[2], 1.2 * reach)
 
 
 _CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], np.int64)
-_AROUND = np.array(
-    [[i, j, k] for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)], np.int64
-)
 
 
 class _Octree:
@@ -189,9 +186,10 @@ class _Octree:
         self.leaves: list[_Keys] = [np.zeros(0, np.int64) for _ in range(lattice.levels)]
 
     def judge(self, keys: _Keys, level: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-        """Tell which cells matter, and the thinnest limb in each."""
+        """Tell which cells matter, and the thinnest limb in each but the smallest."""
         centre = self.lattice.places(unpack(keys) + (1 << level))
-        near, thin = np.zeros(len(keys), np.bool_), np.full(len(keys), np.inf)
+        near = np.zeros(len(keys), np.bool_)
+        thin = np.full(len(keys) if level else 0, np.inf)  # the smallest cells are not cut
         reach = np.sqrt(3.0) * self.lattice.unit * (1 << level)
         in_threads(_judge, self.blend.kernel, centre, reach, self.slope, near, thin)
         return near, thin
@@ -206,14 +204,29 @@ class _Octree:
         cell = 2.0 * self.lattice.unit
         while len(keys):
             near, thin = self.judge(keys, level)
-            keys, thin = keys[near], thin[near]
+            keys = keys[near]
             if level >= self.lattice.levels:
                 cut = np.ones(len(keys), np.bool_)
+            elif level == 0:
+                self.leaves[0] = np.union1d(self.leaves[0], keys)
+                break
             else:
-                cut = (level > 0) & (cell * (1 << level) * self.in_radius > thin * (1.0 + 1e-9))
+                cut = cell * (1 << level) * self.in_radius > thin[near] * (1.0 + 1e-9)
                 self.leaves[level] = np.union1d(self.leaves[level], keys[~cut])
             keys = self.split(keys[cut], level)
             level -= 1
+
+    def touched(self, grid: NDArray[np.int64], size: int, level: int) -> NDArray[np.bool_]:
+        """Tell which leaves of a level hold one of, or touch, smaller cells of width `size`."""
+        wide = 1 << (level + 1)
+        low, high = (grid - size) // wide * wide, (grid + size) // wide * wide
+        leaves = self.leaves[level]
+        hit = np.zeros(len(leaves), np.bool_)
+        for upward in _CORNERS if len(leaves) else ():
+            keys = pack(np.where(upward, high, low))
+            at = np.minimum(np.searchsorted(leaves, keys), len(leaves) - 1)
+            hit[at[leaves[at] == keys]] = True
+        return hit
 
     def balance(self) -> None:
         """Cut cells until none touches one that is less than half as wide."""
@@ -222,12 +235,9 @@ class _Octree:
             held = np.union1d(held, self.leaves[level])
             size = 1 << (level + 2)  # of a parent, in units
             parents = np.unique(pack(unpack(held) // size * size))
-            grid = unpack(parents)[:, None, :] + _AROUND[None] * size
-            around = np.unique(pack(grid.reshape(-1, 3)))
+            grid = unpack(parents)
             for upper in range(self.lattice.levels - 1, level + 1, -1):
-                wide = 1 << (upper + 1)
-                touched = np.unique(pack(unpack(around) // wide * wide))
-                hit = np.isin(self.leaves[upper], touched)
+                hit = self.touched(grid, size, upper)
                 children = self.split(self.leaves[upper][hit], upper)
                 self.leaves[upper] = self.leaves[upper][~hit]
                 near, _ = self.judge(children, upper - 1)

@@ -7,7 +7,7 @@ with all that it bears, is left out: it stays tubes (see `weld`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from forest._jit import njit
 from forest.errors import InputError
+from forest.surface.tubes import LEAST_RADIUS_M
 from forest.trees.skeleton import Skeleton
 
 _Floats = NDArray[np.float64]
@@ -143,20 +144,26 @@ def check(skeleton: Skeleton) -> None:
     Raises
     ------
     InputError
-        If the skeleton is empty, or an internode has no radius or no place.
+        If the skeleton is empty, a radius is below 0 or no number, or an internode has no place.
     """
     if len(skeleton) == 0:
         raise InputError("a skeleton without internodes has no surface", where="skeleton")
-    bad = ~(np.isfinite(skeleton.radius) & (skeleton.radius > 0.0))
+    bad = ~(np.isfinite(skeleton.radius) & (skeleton.radius >= 0.0))
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         raise InputError(
             f"internode {i} has radius {skeleton.radius[i]:g} m ({int(bad.sum())} such)",
             where="skeleton.radius",
-            expected="radii above 0",
+            expected="0 or more",
         )
     if not (np.isfinite(skeleton.start).all() and np.isfinite(skeleton.end).all()):
         raise InputError("an internode's place is not a number", where="skeleton.start, end")
+
+
+def sound(skeleton: Skeleton) -> Skeleton:
+    """Refuse what has no surface; raise radii below that of the thinnest wood, as tubes do."""
+    check(skeleton)
+    return replace(skeleton, radius=np.maximum(skeleton.radius, LEAST_RADIUS_M))
 
 
 def thick_enough(skeleton: Skeleton, thinnest_m: float) -> NDArray[np.bool_]:
@@ -219,7 +226,7 @@ def limbs_of(
     InputError
         If the skeleton has no surface, or nothing in it is so thick.
     """
-    check(skeleton)
+    skeleton = sound(skeleton)
     kept = thick_enough(skeleton, thinnest_m)
     long = skeleton.length > SHORTEST
     if not kept.any() and long.any():

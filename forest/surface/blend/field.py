@@ -269,6 +269,27 @@ def gradient(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
 
 
 @njit
+def _slope(field: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
+    """The function's slope (3): the nearest cone's where that alone makes f, else differences."""
+    cones = field.cones
+    ax, ay, az = cones.start[i, 0], cones.start[i, 1], cones.start[i, 2]
+    lx, ly, lz = cones.end[i, 0] - ax, cones.end[i, 1] - ay, cones.end[i, 2] - az
+    square = lx * lx + ly * ly + lz * lz
+    t = ((x - ax) * lx + (y - ay) * ly + (z - az) * lz) / square
+    s = min(max(t, 0.0), 1.0)
+    dx, dy, dz = x - ax - s * lx, y - ay - s * ly, z - az - s * lz
+    d = np.sqrt(dx * dx + dy * dy + dz * dz)
+    change = cones.high[i] - cones.low[i]
+    if abs(d - cones.low[i] - s * change - f) > 1e-12 or d <= _TINY:
+        gx = (value(field, x + _STEP, y, z, i)[0] - f) / _STEP
+        gy = (value(field, x, y + _STEP, z, i)[0] - f) / _STEP
+        gz = (value(field, x, y, z + _STEP, i)[0] - f) / _STEP
+        return gx, gy, gz
+    taper = change / square if s == t else 0.0
+    return dx / d - taper * lx, dy / d - taper * ly, dz / d - taper * lz
+
+
+@njit
 def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: Any) -> Any:
     """Move a point onto the surface by Newton steps of at most `most` metres each.
 
@@ -282,9 +303,7 @@ def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: 
         if abs(f) < _CLOSE:
             break
         if fresh:
-            gx = (value(field, x + _STEP, y, z, which)[0] - f) / _STEP
-            gy = (value(field, x, y + _STEP, z, which)[0] - f) / _STEP
-            gz = (value(field, x, y, z + _STEP, which)[0] - f) / _STEP
+            gx, gy, gz = _slope(field, x, y, z, f, which)
             square = max(gx * gx + gy * gy + gz * gz, 0.01)
         step = f / square
         size = abs(step) * np.sqrt(gx * gx + gy * gy + gz * gz)

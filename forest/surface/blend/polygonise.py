@@ -1,10 +1,4 @@
-"""Marching tetrahedra over balanced cells: always a closed surface without branching edges.
-
-A cell is cut into tetrahedra between its centre and triangles on its faces. How a face is cut
-hangs only on which lattice points exist on it, so that both its cells agree: a face with a point
-in its middle is four squares, one with points on its edges a fan from the first of them, one
-without any is cut along the diagonal from its lowest corner.
-"""
+"""From cells near the surface to triangles whose points lie on it."""
 
 from __future__ import annotations
 
@@ -13,61 +7,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import driver, njit
+from forest._jit import driver
 from forest._threads import in_threads
 from forest.surface.blend.cells import Lattice, pack, unpack
+from forest.surface.blend.dual import FACES, POINTS, VERTEX_BITS, loops, polygons
 from forest.surface.blend.field import Blend, on_surface, value
-from forest.surface.mesh import Mesh
 
 _Keys = NDArray[np.int64]
 _CHUNKS = 64
-#: Nearest to a lattice point that a vertex is put on an edge, as a part of it.
-_END = 0.08
-
-#: Offsets, in half cells, of the 27 points of a cell; index 9 i + 3 j + k.
-_POINTS = np.array([[i, j, k] for i in range(3) for j in range(3) for k in range(3)], np.int64)
-
-
-def _faces() -> NDArray[np.int64]:
-    """Points of each face: four corners around it, the middles after each, and its centre.
-
-    Seen from outside the corners of the high faces run anticlockwise, of the low ones clockwise.
-    """
-    rows = []
-    for axis in range(3):
-        b, c = [(1, 2), (2, 0), (0, 1)][axis]
-        for side in (0, 2):
-            row = []
-            for u, v in ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)):
-                p = [0, 0, 0]
-                p[axis], p[b], p[c] = side, u, v
-                row.append(9 * p[0] + 3 * p[1] + p[2])
-            rows.append(row)
-    return np.array(rows, np.int64)
-
-
-_FACES = _faces()
+_CORNERS = np.flatnonzero((POINTS % 2 == 0).all(axis=1))
+#: Middles of edges and faces: points that are there where a neighbour is finer.
+_BETWEEN = np.setdiff1d(np.arange(27), [*_CORNERS, 13])
 
 
 def lattice_points(leaves: list[_Keys]) -> _Keys:
-    """List corners and centres of all cells, and what faces with a point in the middle need."""
-    corner = _POINTS[(_POINTS % 2 == 0).all(1)]
-    parts = []
+    """List the corners of all cells, and what faces with a point in the middle need."""
+    points = np.zeros(0, np.int64)
     for level, keys in enumerate(leaves):
-        grid = unpack(keys)
-        parts.append(np.unique(pack((grid[:, None] + corner * (1 << level)).reshape(-1, 3))))
-        parts.append(pack(grid + (1 << level)))
-    points = np.unique(np.concatenate(parts))
-    more = []
-    for level, keys in enumerate(leaves):
-        if level == 0:
-            continue
-        grid = unpack(keys)
-        for face in _FACES:
-            centre = pack(grid + _POINTS[face[8]] * (1 << level))
-            cut = grid[_find(points, centre) >= 0]
-            more += [pack(cut + _POINTS[m] * (1 << level)) for m in face[4:8]]
-    return np.unique(np.concatenate([points, *more]))
+        shifts = pack(POINTS[_CORNERS] * (1 << level))
+        points = _sorted(np.concatenate([points, *(keys + shift for shift in shifts)]))
+    more = [points]
+    for level, keys in enumerate(leaves[1:], 1):
+        shifts = pack(POINTS * (1 << level))
+        for face in FACES:
+            cut = keys[_find(points, keys + shifts[face[8]]) >= 0]
+            more += [cut + shifts[m] for m in face[4:8]]
+    return _sorted(np.concatenate(more))
+
+
+def _sorted(keys: _Keys) -> _Keys:
+    """Sort keys and drop those that are there twice; in place."""
+    keys.sort(kind="stable")
+    return keys[np.concatenate(([True], keys[1:] != keys[:-1]))] if len(keys) else keys
 
 
 def _find(points: _Keys, keys: _Keys) -> _Keys:
@@ -76,145 +47,24 @@ def _find(points: _Keys, keys: _Keys) -> _Keys:
     return np.where(points[at] == keys, at, -1)
 
 
-def _members(points: _Keys, leaves: list[_Keys]) -> NDArray[np.int32]:
-    """Give each cell's 27 points as indices, -1 where there is none."""
+def members_of(points: _Keys, leaves: list[_Keys], inside: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Give the 27 points, -1 where there is none, of each cell that the surface may cross."""
     rows = []
     for level, keys in enumerate(leaves):
-        grid = unpack(keys)
-        row = np.empty((len(keys), 27), np.int32)
-        for k, offset in enumerate(_POINTS):
-            whole = bool((offset % 2 == 0).all()) or k == 13
-            if level == 0 and not whole:
-                row[:, k] = -1
-            else:
-                row[:, k] = _find(points, pack(grid + offset * (1 << level)))
+        shifts = pack(POINTS * (1 << level))
+        corner = np.empty((len(keys), 8), np.int32)
+        for k, point in enumerate(_CORNERS):
+            corner[:, k] = _find(points, keys + shifts[point])
+        if level == 0:  # nothing is finer
+            within = inside[corner].sum(axis=1)
+            crossed = (within > 0) & (within < 8)
+            keys, corner = keys[crossed], corner[crossed]
+        row = np.full((len(keys), 27), -1, np.int32)
+        row[:, _CORNERS] = corner
+        for point in _BETWEEN if level else ():
+            row[:, point] = _find(points, keys + shifts[point])
         rows.append(row)
     return np.concatenate(rows)
-
-
-@njit
-def _emit(
-    a: Any, b: Any, c: Any, d: Any, inside: Any, count: Any, key: Any, n: Any, write: Any
-) -> Any:
-    """Cut one tetrahedron, its corners positively turned; gives the number of triangles so far."""
-    which = (
-        np.int64(inside[a]) + 2 * np.int64(inside[b]) + 4 * np.int64(inside[c])
-    ) + 8 * np.int64(inside[d])
-    if which == 0 or which == 15:
-        return count
-    # Bring the corners into an even order in which those inside come first.
-    if which == 2 or which == 13:
-        a, b, c, d = b, c, a, d
-    elif which == 4 or which == 11:
-        a, b, c, d = c, a, b, d
-    elif which == 8 or which == 7:
-        a, b, c, d = d, c, b, a
-    elif which == 5:
-        a, b, c, d = a, c, d, b
-    elif which == 9:
-        a, b, c, d = a, d, b, c
-    elif which == 6:
-        a, b, c, d = b, c, a, d
-    elif which == 10:
-        a, b, c, d = b, d, c, a
-    elif which == 12:
-        a, b, c, d = c, d, a, b
-    one = which == 1 or which == 2 or which == 4 or which == 8
-    three = which == 14 or which == 13 or which == 11 or which == 7
-    if one:
-        if write:
-            _triangle(key, count, n, a, b, a, c, a, d)
-        return count + 1
-    if three:
-        if write:
-            _triangle(key, count, n, a, b, a, d, a, c)
-        return count + 1
-    if write:
-        _triangle(key, count, n, a, c, a, d, b, d)
-        _triangle(key, count + 1, n, a, c, b, d, b, c)
-    return count + 2
-
-
-@njit
-def _triangle(key: Any, at: Any, n: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> None:
-    key[at, 0] = min(a, b) * n + max(a, b)
-    key[at, 1] = min(c, d) * n + max(c, d)
-    key[at, 2] = min(e, f) * n + max(e, f)
-
-
-@njit
-def _face(
-    o: Any, p: Any, face: Any, high: Any, inside: Any, count: Any, key: Any, n: Any, write: Any
-) -> Any:
-    """Cut the tetrahedra over one face of a cell whose centre is `o`."""
-    if p[face[8]] >= 0:
-        for k in range(4):
-            a, b, c, d = p[face[0]], p[face[4]], p[face[8]], p[face[7]]  # lowest corner first
-            if k == 1:
-                a, b, c, d = p[face[4]], p[face[1]], p[face[5]], p[face[8]]
-            elif k == 2:
-                a, b, c, d = p[face[8]], p[face[5]], p[face[2]], p[face[6]]
-            elif k == 3:
-                a, b, c, d = p[face[7]], p[face[8]], p[face[6]], p[face[3]]
-            count = _pair(o, a, b, c, d, high, inside, count, key, n, write)
-        return count
-    apex = -1
-    for k in range(4):
-        if apex < 0 and p[face[4 + k]] >= 0:
-            apex = k
-    if apex < 0:
-        return _pair(
-            o, p[face[0]], p[face[1]], p[face[2]], p[face[3]], high, inside, count, key, n, write
-        )
-    top = np.int64(p[face[4 + apex]])
-    last = np.int64(p[face[(apex + 1) % 4]])
-    for step in range(1, 4):
-        middle = np.int64(p[face[4 + (apex + step) % 4]])
-        corner = np.int64(p[face[(apex + step + 1) % 4]])
-        if middle >= 0:
-            count = _one(o, top, last, middle, high, inside, count, key, n, write)
-            last = middle
-        count = _one(o, top, last, corner, high, inside, count, key, n, write)
-        last = corner
-    return count
-
-
-@njit
-def _pair(
-    o: Any, a: Any, b: Any, c: Any, d: Any, high: Any, inside: Any, count: Any, key: Any, n: Any,
-    write: Any,
-) -> Any:  # fmt: skip
-    count = _one(o, a, b, c, high, inside, count, key, n, write)
-    return _one(o, a, c, d, high, inside, count, key, n, write)
-
-
-@njit
-def _one(
-    o: Any, a: Any, b: Any, c: Any, high: Any, inside: Any, count: Any, key: Any, n: Any, write: Any
-) -> Any:
-    o, a, b, c = np.int64(o), np.int64(a), np.int64(b), np.int64(c)
-    if high:
-        return _emit(o, a, b, c, inside, count, key, n, write)
-    return _emit(o, a, c, b, inside, count, key, n, write)
-
-
-@njit
-def _march(members: Any, faces: Any, inside: Any, key: Any, write: Any) -> Any:
-    """Cut all cells; gives the number of triangles, and writes their edges' names if asked."""
-    count = np.int64(0)
-    n = np.int64(len(inside))
-    for i in range(len(members)):
-        p = members[i]
-        o = p[13]
-        mixed = False
-        for k in range(27):
-            if p[k] >= 0 and inside[p[k]] != inside[o]:
-                mixed = True
-        if not mixed:
-            continue
-        for f in range(6):
-            count = _face(o, p, faces[f], f % 2 == 1, inside, count, key, n, write)
-    return count
 
 
 @driver
@@ -246,47 +96,95 @@ def march(
     Returns
     -------
     points : float64 (n, 3)
-        On the surface, m; only near it if the mesh is open.
+        On the surface, m.
     triangles : int32 (m, 3)
         Anticlockwise from outside. Closed if no cell is missing.
     """
-    lattice_keys = lattice_points(leaves)
-    members = _members(lattice_keys, leaves)
-    places = lattice.places(unpack(lattice_keys))
-    f, hints = np.empty(len(places)), np.empty(len(places), np.int64)
-    in_threads(_values, blend.kernel, places, f, hints)
-    inside = f < 0.0
-    none = np.zeros((0, 3), np.int64)
-    edges = np.empty((int(_march(members, _FACES, inside, none, False)), 3), np.int64)
-    _march(members, _FACES, inside, edges, True)
-    del members
-    names, corners = np.unique(edges, return_inverse=True)
-    del edges
-    a, b = names // len(places), names % len(places)
-    t = np.clip(f[a] / (f[a] - f[b]), _END, 1.0 - _END)[:, None]
-    points = (1.0 - t) * places[a] + t * places[b]
-    most = 0.5 * np.linalg.norm(places[a] - places[b], axis=1)
-    hints = hints[a]
-    triangles: NDArray[np.int32] = corners.reshape(-1, 3).astype(np.int32)
-    if not Mesh(points, triangles, np.zeros((0, 3, 2))).is_watertight:
-        return points, triangles  # a cell is missing: not worth the pulling
-    return _even(blend, points, triangles, most, hints), triangles
+    keys = lattice_points(leaves)
+    places = lattice.places(unpack(keys))
+    f, near = np.empty(len(places)), np.empty(len(places), np.int64)
+    in_threads(_values, blend.kernel, places, f, near)
+    members = members_of(keys, leaves, f < 0.0)
+    del keys
+    points, triangles, room, hints = sheets(members, f, places, near, lattice.unit)
+    del members, places, f, near
+    return _even(blend, points, triangles, room, hints), triangles
+
+
+def sheets(
+    members: NDArray[np.int32],
+    f: NDArray[np.float64],
+    places: NDArray[np.float64],
+    near: _Keys,
+    unit: float,
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64], _Keys]:
+    """Part the lattice points inside from those outside by triangles.
+
+    Parameters
+    ----------
+    members : int32 (cells, 27)
+        Lattice points of each cell, -1 where there is none.
+    f, places, near : arrays (n,), (n, 3), (n,)
+        Values at lattice points, negative inside; where they lie, m; and the cones nearest to them.
+    unit : float
+        Half the width of the smallest cell, m.
+
+    Returns
+    -------
+    tuple
+        Points, triangles, how far each point may be moved at a time (m), and a cone near each.
+    """
+    points, room, hints, record, cells = _vertices(members, f, places, near, unit)
+    middle, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
+    made, count = polygons(record, f, points, cells, middle, triangles)
+    middle, triangles = np.empty((made, 3)), np.empty((count, 3), np.int32)
+    polygons(record, f, points, cells, middle, triangles)
+    room = np.concatenate((room, np.full(made, 0.5 * unit)))
+    hints = np.concatenate((hints, np.zeros(made, np.int64)))
+    return np.concatenate((points, middle)), triangles, room, hints
+
+
+def _vertices(
+    members: NDArray[np.int32],
+    f: NDArray[np.float64],
+    places: NDArray[np.float64],
+    near: _Keys,
+    unit: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], _Keys, _Keys, int]:
+    """Give vertices, how far each may be moved, cones near them, and records.
+
+    Also how many vertices lie in cells; the others lie on faces.
+    """
+    none, empty = np.zeros(0), np.zeros(0, np.int64)
+    no_pairs, no_points = np.zeros((0, 2), np.int64), np.zeros((0, 3))
+    size = loops(
+        members, f, places, near, no_points, none, empty, empty, no_pairs, no_points, False
+    )
+    points, room, hints = np.empty((size[0], 3)), np.empty(size[0]), np.empty(size[0], np.int64)
+    record = np.empty(size[1], np.int64)
+    pairs, between = np.empty((size[2], 2), np.int64), np.empty((size[2], 3))
+    loops(members, f, places, near, points, room, hints, record, pairs, between, True)
+    pairs, index = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
+    names = pairs.T << VERTEX_BITS | (len(points) + np.arange(len(pairs)))
+    record = np.concatenate((record, names.ravel()))
+    record.sort()
+    hints = np.concatenate((hints, np.zeros(len(pairs), np.int64)))
+    room = np.concatenate((room, np.full(len(pairs), 0.5 * unit)))
+    return np.concatenate((points, between[index])), room, hints, record, int(size[0])
 
 
 #: Rounds in which vertices move towards the middle of their neighbours, along the surface.
-_ROUNDS = 2
+_ROUNDS = 4
 
 
 def _even(
     blend: Blend,
     points: NDArray[np.float64],
     triangles: NDArray[np.int32],
-    most: NDArray[np.float64],
+    room: NDArray[np.float64],
     hints: _Keys,
 ) -> NDArray[np.float64]:
     """Even out the triangles near the surface, then pull their vertices onto it."""
-    kernel = blend.kernel
-    in_threads(_settle, kernel, points, most, np.int64(1), hints)
     count = np.bincount(triangles.ravel(), minlength=len(points))[:, None].astype(np.float64)
     for _ in range(_ROUNDS):
         middle = np.zeros_like(points)
@@ -297,7 +195,7 @@ def _even(
                 middle[:, axis] += np.bincount(triangles[:, k], around, minlength=len(points))
         step = 0.5 * (middle / (2.0 * count) - points)
         size = np.linalg.norm(step, axis=1)
-        step *= np.minimum(1.0, 0.5 * most / np.maximum(size, 1e-12))[:, None]
+        step *= np.minimum(1.0, 0.5 * room / np.maximum(size, 1e-12))[:, None]
         points = points + step
-    in_threads(_settle, kernel, points, most, np.int64(6), hints)
+    in_threads(_settle, blend.kernel, points, room, np.int64(6), hints)
     return points

@@ -7,7 +7,7 @@ import numpy as np
 from forest.growth.parameters import support
 from forest.mechanics.branch_points import support_offset, widening
 from forest.species import Species
-from forest.surface.blend.cones import Reaction, check
+from forest.surface.blend.cones import Reaction, sound
 from forest.trees.skeleton import Skeleton
 
 
@@ -31,7 +31,7 @@ def reaction_wood(skeleton: Skeleton, species: Species) -> Reaction:
     As `forest.mechanics.branch_points.reaction_rings` for a tree in the arena, except that here
     each leafy node bears the leaves of one site.
     """
-    check(skeleton)
+    skeleton = sound(skeleton)
     density = species.mechanics.green_density_kg_m3
     strength = float(support([species], np.array([density]))[0]) * density
     leaf = species.leaves.area_m2 / species.leaves.sla_m2_kg * species.mechanics.leaf_water_factor

@@ -18,7 +18,7 @@ _Ints = NDArray[np.int64]
 #: A twig grows from the blended surface, or from the ground (others: index of their host).
 BLENDED, GROUND = -1, -2
 #: A twig has this many sides where its radius exceeds this part of a cell.
-_SIDES = ((1.0, 6), (0.5, 5), (0.25, 4), (0.0, 3))
+_SIDES = ((1.5, 8), (1.0, 6), (0.5, 5), (0.25, 4), (0.0, 3))
 _TOLERANCE = 0.1
 _OUT = 0.6  # a twig's first ring stands so many radii off the surface
 _OUT_ALONG = 0.2  # and where it goes on from a limb's end

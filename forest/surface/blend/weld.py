@@ -379,6 +379,11 @@ class Welded(NamedTuple):
     lost: int  # twigs that found no place
 
 
+def _middles(points: _Floats, triangles: NDArray[np.int32]) -> _Floats:
+    a, b, c = triangles.T
+    return np.asarray((points[a] + points[b] + points[c]) / 3.0)
+
+
 def weld(points: _Floats, triangles: NDArray[np.int32], twigs: Twigs) -> Welded:
     """Add twigs to a closed surface."""
     count, rings = len(twigs.host), np.diff(twigs.first)
@@ -402,7 +407,7 @@ def weld(points: _Floats, triangles: NDArray[np.int32], twigs: Twigs) -> Welded:
     near = np.zeros((count, 1), np.int64)
     beyond = np.zeros((0, 3), np.int32)
     if len(triangles):
-        tree = cKDTree(points[triangles].mean(axis=1))
+        tree = cKDTree(_middles(points, triangles), balanced_tree=False, compact_nodes=False)
         k = min(_CANDIDATES, len(triangles))
         near = np.asarray(tree.query(twigs.exit, k=k)[1], np.int64).reshape(count, k)
         beyond = neighbours(triangles, len(points))

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError, nearest
 from forest.surface.blend.cells import CELLS_IN_RADIUS, SLOPE, cells_near, check_memory, lattice_of
-from forest.surface.blend.cones import Limbs, Reaction, check, limbs_of
+from forest.surface.blend.cones import Reaction, limbs_of, sound
 from forest.surface.blend.crossings import crossings
 from forest.surface.blend.field import Blend
 from forest.surface.blend.foot import Flare, usual_flare
+from forest.surface.blend.odd import refuse_buried, tell_gaps
 from forest.surface.blend.polygonise import march
 from forest.surface.blend.twigs import Twigs, twigs_of
+from forest.surface.blend.unrolled import unroll
 from forest.surface.blend.weld import Welded, weld
 from forest.surface.frames import carry_frames
 from forest.surface.mesh import Mesh
@@ -24,7 +26,7 @@ _Floats = NDArray[np.float64]
 
 READINGS = ("corrected", "paper")
 #: Limbs thinner than this radius, in cells, are tubes.
-THINNEST = 2.0
+THINNEST = 2.5
 #: Usual cells are this part of the radius at the ground, but within these bounds, m.
 _USUAL_PART, _USUAL_LEAST, _USUAL_MOST = 0.1, 0.001, 0.02
 _TRIES = 5
@@ -36,7 +38,7 @@ class CrossingWarning(UserWarning):
 
 def usual_cell(skeleton: Skeleton) -> float:
     """Give the cell's width for a tree of this size, m."""
-    check(skeleton)
+    skeleton = sound(skeleton)
     base = float(skeleton.radius[skeleton.parent < 0].max(initial=0.0))
     return float(np.clip(_USUAL_PART * base, _USUAL_LEAST, _USUAL_MOST))
 
@@ -71,7 +73,7 @@ def blend_of(
     """
     if readings not in READINGS:
         raise InputError(f"unknown readings {readings!r}, {nearest(readings, READINGS)}")
-    check(skeleton)
+    skeleton = sound(skeleton)
     if isinstance(flare, str):
         if flare != "usual":
             raise InputError(f"unknown flare {flare!r}", expected="'usual', None or a Flare")
@@ -108,9 +110,9 @@ def blended(
     skeleton : Skeleton
         The tree, whoever made it.
     cell_m : float, optional
-        Width of the smallest cell, m; thicker limbs have cells up to a third of their radius,
-        and what is thinner than two cells in radius is a tube of few sides, welded in. Without it
-        a tenth of the radius at the ground, but 1 mm to 2 cm.
+        Width of the smallest cell, m; thicker limbs have cells up to a quarter of their radius, and
+        what is thinner than two and a half cells in radius is a tube of few sides, welded in.
+        Without it a tenth of the radius at the ground, but 1 mm to 2 cm.
     reaction : Reaction, optional
         Reaction wood, e.g. of `reaction_wood`.
     flare : Flare, "usual" or None
@@ -120,8 +122,8 @@ def blended(
     cells_in_radius : float
         How many cells, at least, the radius of a thick limb is.
     strict : bool
-        Whether to refuse limbs that cross away from a joint, or pass so near to each other that
-        their surfaces merge; else they are warned of.
+        Whether to refuse limbs that start off their parent, cross away from a joint, or pass so
+        near to each other that their surfaces merge; else they are warned of.
 
     Returns
     -------
@@ -132,15 +134,16 @@ def blended(
     Raises
     ------
     InputError
-        If the skeleton has no surface, the cells are too large for the tree or too small for the
-        memory (said before anything is made), limbs cross or touch and `strict` is set, or the
-        surface is not closed with cells of this width.
+        If the skeleton has no surface, a stem grows down from its base, the cells are too large
+        for the tree or too small for the memory (said before anything is made), limbs cross, touch
+        or start off their parent and `strict` is set, or the surface is not closed with cells of
+        this width.
 
     Notes
     -----
     Hart & Baker 2003, sections 5.1 and 5.2, eqs 26 to 31.
     """
-    check(skeleton)
+    skeleton = sound(skeleton)
     cell_m = usual_cell(skeleton) if cell_m is None else float(cell_m)
     if not (np.isfinite(cell_m) and cell_m > 0.0):
         raise InputError(f"a cell of {cell_m} m", where="cell_m", expected="a width above 0")
@@ -153,6 +156,7 @@ def blended(
         )
     if not 1.0 <= cells_in_radius <= 50.0:
         raise InputError(f"{cells_in_radius}", where="cells_in_radius", expected="1 to 50")
+    tell_gaps(skeleton, strict)
     blend = blend_of(
         skeleton,
         thinnest_m=THINNEST * cell_m,
@@ -160,6 +164,7 @@ def blended(
         flare=flare,
         readings=readings,
     )
+    refuse_buried(blend.limbs.cones)
     check_memory(blend.limbs.cones, cell_m, cells_in_radius)
     crossed = _tell_crossings(blend, strict)
     points, triangles, handles = _closed(blend, cell_m, cells_in_radius)
@@ -259,8 +264,10 @@ def _dressed(skeleton: Skeleton, blend: Blend, welded: Welded, twigs: Twigs, sid
     radius[limb] = found.radius
     internode[~limb] = twigs.internode[welded.ring[~limb]]
     radius[~limb] = twigs.radius[welded.ring[~limb]]
+    own = np.zeros(len(welded.point), np.int64)
+    own[limb] = found.cone
     uv = welded.uv
-    uv[welded.blended] = _unrolled(blend, side, welded.point[welded.triangle[welded.blended]])
+    unroll(blend.limbs, side, welded.point, own, welded.triangle, welded.blended, uv)
     return Mesh(
         welded.point,
         welded.triangle,
@@ -273,41 +280,3 @@ def _dressed(skeleton: Skeleton, blend: Blend, welded: Welded, twigs: Twigs, sid
             "axis": skeleton.axis[internode].astype(np.int32),
         },
     )
-
-
-def _cone_sides(limbs: Limbs, side: _Floats) -> tuple[_Floats, _Floats]:
-    """Give the carried direction across each cone at its start and its end."""
-    cones = limbs.cones
-    length = np.linalg.norm(cones.end - cones.start, axis=1)
-    small = 1e-6 * length + 2e-9
-    low = side[limbs.internode(cones.axis, cones.along + small)]
-    high = side[limbs.internode(cones.axis, cones.along + length + small)]
-    return low, high
-
-
-def _unrolled(blend: Blend, side: _Floats, corners: _Floats) -> _Floats:
-    """Texture coordinates (m, 3, 2) of triangles on the limb nearest to each one's middle."""
-    cones = blend.limbs.cones
-    middle = blend.limb(corners.mean(axis=1))
-    low, high = _cone_sides(blend.limbs, side)
-    uv = np.empty((len(corners), 3, 2))
-    angle = np.empty((len(corners), 3))
-    for k in range(3):
-        own = blend.limb(corners[:, k])
-        which = np.where(own.axis == middle.axis, own.cone, middle.cone)
-        line = cones.end[which] - cones.start[which]
-        length = np.linalg.norm(line, axis=1)
-        heading = line / length[:, None]
-        offset = corners[:, k] - cones.start[which]
-        along = np.sum(offset * heading, axis=1)
-        t = np.clip(along / length, 0.0, 1.0)
-        across = (1.0 - t)[:, None] * low[which] + t[:, None] * high[which]
-        across -= np.sum(across * heading, axis=1)[:, None] * heading
-        beside = np.cross(heading, across)
-        angle[:, k] = np.arctan2(np.sum(offset * beside, axis=1), np.sum(offset * across, axis=1))
-        uv[:, k, 0] = cones.low[which] + t * (cones.high[which] - cones.low[which])
-        uv[:, k, 1] = cones.along[which] + along
-    turn = angle - angle[:, :1]
-    angle -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
-    uv[:, :, 0] *= angle
-    return uv
