@@ -38,7 +38,7 @@ def read_girths(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.float
         rows = read_rows(str(path), None, _COLUMNS)
     except Refusal as refusal:
         raise InputError(refusal.what, expected=refusal.expected) from None
-    found = []
+    found: list[tuple[float, float]] = []
     for line, row in rows:
         where = f"{path} line {line}"
         year, girth = (_value(row[column], column, where) for column in _COLUMNS)
