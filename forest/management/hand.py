@@ -425,8 +425,8 @@ class Hand:
         stand, where = cast("Stand", self), "Stand.stroke"
         checked = Stroking.of(where, points_m=points_m, radius_m=radius_m, **stroke)
         with _one_line(where):
-            check_stroke(checked, "", stand.scenario.environment)
-        drawn = draw(checked, stand, where + ": {}")
+            check_stroke(checked, "", stand.scenario.environment, stand.scenario.plot)
+        drawn = draw(checked, stand, stand.arena, stand.rows, where + ": {}")
         return doing.stroke(stand, BY_HAND, drawn, stand.measure())
 
 
@@ -444,7 +444,8 @@ def _pattern(
     shares = {name: use.share for name, use in stand.scenario.species.items()}
     with _one_line(where):
         check_planted(act, "", stand.scenario.plot, shares)
-    return fill(act, stand, stand.rows.x, stand.rows.y, stand.treatments.number + 1)
+    solid, number = stand.surroundings.solid, stand.treatments.number + 1
+    return fill(act, stand, stand.rows.x, stand.rows.y, number, solid)
 
 
 def _fits(stand: Stand, rule: Thinning | Harvesting, where: str) -> None:
