@@ -213,7 +213,8 @@ class Regeneration:
         self.cohorts = seedlings.keep(self.cohorts, ~tall)
         rows = stand.rows
         places = find_places(ready, self.cells, rows.x, rows.y, seed=self._seed, year=stand.year)
-        places = Places(*(c[~stand.surroundings.blocked(places.x, places.y)] for c in places))
+        free = ~stand.surroundings.blocked(places.x, places.y)
+        places = Places(places.x[free], places.y[free], places.cohort[free])
         placed = np.bincount(places.cohort, minlength=len(ready.n))
         tally.add("recruits_ha", ready.species, placed)
         tally.add("crowded_ha", ready.species, ready.n - placed)

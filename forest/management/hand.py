@@ -368,6 +368,7 @@ class Hand:
         stand, where = cast("Stand", self), "Stand.bend"
         act = Bending.of(where, tree_id=tree_id, metamer=metamer, to_m=to_m)
         row_of(stand.rows, act.tree_id, where=where)
+        where += ": {}"
         shape_to_come(stand, act.tree_id, [], [(act, where)], stand.surroundings.solid)
         return doing.bend(stand, BY_HAND, act, stand.measure(), where)[1]
 
@@ -393,7 +394,7 @@ class Hand:
         stand, where = cast("Stand", self), "Stand.obstacle"
         act = ObstacleChange.of(where, **change)
         standing = np.ones(len(stand.rows.tree_id), np.bool_)
-        found = change_of(act, stand, stand.obstacles.now, standing, where)
+        found = change_of(act, stand, stand.obstacles.now, standing, where + ": {}")
         kappa = self._traits.of["branch_pipe"]
         doing.change_obstacle(stand, BY_HAND, found, kappa, stand.measure())
         return len(found.cuts)

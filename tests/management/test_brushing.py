@@ -329,7 +329,7 @@ BASE = "kind='stroke', year=2001"
         ),
         (
             f"points_m=[{', '.join(200 * ['[-9e4,0,1], [9e4,0,1]'])}], radius_m=0.001",
-            "radius_m: up to 9.4",
+            "radius_m: up to 1.88e+09 markers",
         ),
         ("points_m=[[4,4,1]], radius_m=90", "radius_m: up to 1.77e+09 markers"),
         (

@@ -326,7 +326,7 @@ def test_too_far_is_refused_where_it_stands() -> None:
     with pytest.raises(InputError, match="by_m: 'wall' would be moved too far"):
         stand.obstacle(move="wall", by_m=[1e5, 0, 0])
     huge = {**BOX, "name": "huge", "min_m": [0, 0, 0], "max_m": [9e4, 9e4, 1]}
-    with pytest.raises(InputError, match=r"Stand.obstacle: obstacles: too large or too far away"):
+    with pytest.raises(InputError, match=r"Stand.obstacle: add: obstacles: too large or"):
         stand.obstacle(add=huge)
     assert stand.obstacles.now == before
 
