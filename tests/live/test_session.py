@@ -19,6 +19,7 @@ from pandas.testing import assert_frame_equal
 from forest.errors import ActError, InputError
 from forest.live import LiveSession
 from forest.record.run import open_run
+from forest.record.schema import ACT_KINDS
 from forest.scenario import Scenario
 from forest.simulation import simulate
 from forest.stand import Stand
@@ -122,6 +123,12 @@ def worked() -> LiveSession:
         session.step()
     session.act(kind="fell", tree_ids=[2], cause="thinning")
     session.act(kind="prune", all_trees=True, below_share=0.4)
+    session.act(kind="mark", tree_ids=[3], mark="crop")
+    roof = {"kind": "box", "name": "roof", "min_m": [0, 0, 5], "max_m": [2, 2, 6]}
+    session.act(kind="obstacle", add=roof)
+    session.act(kind="stroke", points_m=[[5, 5, 1]], radius_m=0.5)
+    to = session.skeleton(3).end[1] + np.array([0.02, 0.01, 0.0])
+    session.act(kind="bend", tree_id=3, metamer=1, to_m=to.tolist())
     session.step()
     session.act(
         kind="harvest", method="gap", gap={"kind": "circle", "x_m": 3, "y_m": 3, "radius_m": 2}
@@ -140,9 +147,9 @@ def test_its_run_file_is_the_headless_one(worked: LiveSession, tmp_path: Path) -
     assert live.complete
     assert live.scenario == run.scenario
     assert live.digest == run.digest
-    kinds = {"planted", "died", "felled", "pruned"}
+    kinds = {"planted", "died", "felled", "pruned", "marked", "bent"}
     assert set(run.events.kind) >= kinds - {"died"}
-    assert set(run.treatments.kind) == {"plant", "prune", "thin", "fell", "harvest"}
+    assert set(run.treatments.kind) == set(ACT_KINDS)
     tables = worked.tables
     assert tables.keys() == set(run.tables)
     for name, frame in tables.items():
