@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.dynamics.planting import check_leans, check_planting, headings, seedlings
+from forest.errors import InputError
 from forest.growth.shoots import first_internode, sprout
 from forest.measure.trees import measure_trees
+from forest.scenario.model import Explicit
 from forest.trees import table
 from forest.yearbook import Event
 
 if TYPE_CHECKING:
+    from forest.environment.obstacles import Solid
     from forest.growth.parameters import SpeciesTraits
     from forest.stand import Stand
 
@@ -63,6 +66,54 @@ class Newcomers(NamedTuple):
         return cls(x, y, species, heading, np.zeros(n), none, none, np.full(n, np.nan))
 
 
+def first_trees(stand: Stand) -> Newcomers:
+    """Give the trees of the first year; a pattern leaves out where obstacles are.
+
+    Raises
+    ------
+    InputError
+        If a tree that the scenario names stands in an obstacle.
+    """
+    scenario = stand.scenario
+    x, y, species = scenario.planting_positions()
+    heading = headings(*scenario.planting_leans())
+    if isinstance(scenario.planting, Explicit):
+        check_free(stand, x, y, where="planting.trees[{}]")
+        return Newcomers.planted(x, y, species, heading)
+    free = ~stand.surroundings.blocked(x, y)
+    return Newcomers.planted(x[free], y[free], species[free], heading[free])
+
+
+def check_free(
+    stand: Stand,
+    x: Sequence[float] | NDArray[Any],
+    y: Sequence[float] | NDArray[Any],
+    *,
+    where: str,
+    solid: Solid | None = None,
+) -> None:
+    """Refuse trees whose foot would lie in an obstacle.
+
+    Parameters
+    ----------
+    stand : Stand
+    x, y : sequence of n floats
+        Places, m.
+    where : str
+        Names the trees in messages; {} stands for the number of one.
+    solid : Solid, optional
+        What obstacles that are to come fill; default: those that stand.
+    """
+    blocked = stand.surroundings.blocked(np.asarray(x), np.asarray(y), solid)
+    if blocked.any():
+        k = int(np.flatnonzero(blocked)[0])
+        raise InputError(
+            f"({x[k]:g}, {y[k]:g}) lies in an obstacle",
+            where=where.format(k),
+            expected="a place outside all obstacles",
+        )
+
+
 def plant(
     stand: Stand,
     x: Sequence[float],
@@ -78,6 +129,7 @@ def plant(
     width, depth = stand.scenario.plot.size_m
     check_planting(*at, names, (width, depth), stand.species_names)
     leans = check_leans(len(x), lean_deg, lean_azimuth_deg)
+    check_free(stand, *at, where="Stand.plant")
     if stand.scenario.plot.boundary == "periodic":
         at = at[0] % width, at[1] % depth
     codes = np.array([stand.species_names.index(name) for name in names], np.int16)

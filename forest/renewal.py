@@ -213,6 +213,8 @@ class Regeneration:
         self.cohorts = seedlings.keep(self.cohorts, ~tall)
         rows = stand.rows
         places = find_places(ready, self.cells, rows.x, rows.y, seed=self._seed, year=stand.year)
+        free = ~stand.surroundings.blocked(places.x, places.y)
+        places = Places(places.x[free], places.y[free], places.cohort[free])
         placed = np.bincount(places.cohort, minlength=len(ready.n))
         tally.add("recruits_ha", ready.species, placed)
         tally.add("crowded_ha", ready.species, ready.n - placed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -128,21 +128,19 @@ def simulate(
                 _grow(stand, writer, out, observer)
             finally:
                 observer.end()
-    return _with_meshes(open_run(out), observer)
+    return with_meshes(open_run(out), observer.say)
 
 
-def _with_meshes(run: Run, observer: Observer) -> Run:
+def with_meshes(run: Run, say: Callable[[str], None]) -> Run:
     """Write the surfaces of a finished run's sample trees, if the scenario asks for them."""
     wanted = run.scenario.output.sample_trees
     form = wanted.meshes
     if form is not None and run.samples:
         from forest.view.tree_mesh import write_samples
 
-        observer.say(f"writing the surfaces of {len(run.samples)} sample trees")
-        written = write_samples(
-            run, f".{form}", bark=wanted.bark, surface=wanted.surface, say=observer.say
-        )
-        observer.say(f"{written[0].parent} holds them")
+        say(f"writing the surfaces of {len(run.samples)} sample trees")
+        written = write_samples(run, f".{form}", bark=wanted.bark, surface=wanted.surface, say=say)
+        say(f"{written[0].parent} holds them")
     return run
 
 

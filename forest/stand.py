@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from forest import establishment, management
 from forest.dynamics import mortality
 from forest.dynamics.mortality import Death
-from forest.dynamics.planting import headings
 from forest.dynamics.snags import DeadWood
 from forest.dynamics.storms import Storms
 from forest.environment.climate import Climate
@@ -114,9 +113,7 @@ class Stand(management.Hand):
         if isinstance(scenario.planting, Inventory):
             self.built = settle(self, scenario.planting, Stand, say)
         else:
-            first = establishment.Newcomers.planted(
-                *scenario.planting_positions(), headings(*scenario.planting_leans())
-            )
+            first = establishment.first_trees(self)
             establishment.establish(self, first, "planted", self._traits)
         management.check_due(self)  # what cannot be done in the first year is refused before it
         mortality.check_due(self)

@@ -12,7 +12,7 @@ years = {YEARS}
 start_year = 2001
 seed = 5
 plot = {{ size_m = [10, 10], boundary = "periodic" }}
-environment = {{ shadow = {{}}, canopy = {{}} }}
+environment = {{ shadow = {{}}, canopy = {{}}, markers = {{}} }}
 planting = {{ kind = "random", density_ha = 9000, min_distance_m = 0.3 }}
 output = {{ checkpoint_every_years = 3, sample_trees = {{ ids = [1, 2], dbh_quantiles = [0.9] }} }}
 
@@ -80,6 +80,59 @@ thickest_ha = 500
 below_share = 0.3
 
 [[acts]]
+kind = "mark"
+year = 2003
+tree_ids = [9, 12]
+mark = "crop"
+
+[[acts]]
+kind = "prune"
+year = 2006
+marked = "crop"
+below_m = 0.35
+
+[[acts]]
+kind = "bend"
+year = 2003
+tree_id = 9
+metamer = 1
+to_m = [3.7, 6.11, 0.38]
+
+[[acts]]
+kind = "obstacle"
+year = 2004
+add = {{ kind = "box", name = "wall", min_m = [4.0, 3.0, 0.4], max_m = [4.6, 7.0, 1.0] }}
+
+[[acts]]
+kind = "obstacle"
+year = 2006
+move = "wall"
+by_m = [0.4, 0.0, 0.2]
+
+[[acts]]
+kind = "obstacle"
+year = 2009
+remove = "wall"
+
+[[acts]]
+kind = "stroke"
+year = 2004
+points_m = [[3.0, 3.0, 0.5], [6.0, 6.0, 1.5]]
+radius_m = [0.3, 0.8]
+steps = 4
+rotation = {{ x_m = 5.0, y_m = 5.0, times = 2 }}
+
+[[acts]]
+kind = "stroke"
+year = 2005
+tree_id = 9
+metamer = 1
+from_metamer = 1
+points_m = [[4.0, 6.11, 0.9]]
+radius_m = 0.4
+hold_steps = 2
+
+[[acts]]
 kind = "harvest"
 year = 2010
 method = "gap"
@@ -98,7 +151,6 @@ VARIANTS = {
     "bending": (
         "mechanics={wind_m_s=12, wind_growth=true}",
         "mortality.buckling=true",
-        "environment.markers={}",
         "species.betula_pendula.mechanics.modulus_juvenile_gpa=0.02",
     ),
 }

@@ -45,7 +45,7 @@ REGENERATION = [
     ("handover_height_m", "hand_over_height_m", "did you mean 'handover_height_m'?"),
     ("handover_height_m", "cell_m = 0.3\nhandover_height_m", "regeneration.cell_m: 0.3 is finer"),
     ("handover_height_m", "cohorts_per_cell = 0\nhandover_height_m", "cohorts_per_cell: 0"),
-    (", canopy = {} }", " }", "regeneration: seedlings live by the light at the ground"),
+    (", canopy = {}", "", "regeneration: seedlings live by the light at the ground"),
     ("seed = 5", 'seed = 5\nmode = "paper"', "regeneration: seedlings hand over dry mass"),
     ("maturity_height_m = 1.0", "maturity_height_m = -1", "regeneration.maturity_height_m: -1"),
 ]
@@ -90,10 +90,10 @@ MANAGEMENT = [
     ("crop_trees_ha", 'crop_species = "fagus"\ncrop_trees_ha', "acts[1].crop_species[0]: unknown"),
     ("below_share = 0.3", "below_share = 3", "acts[2].below_share: 3"),
     ("thickest_ha = 500\n", "", "acts[2].tree_id: missing"),
-    (", radius_m = 2.5 }\n", " }\n", "acts[3].gap.radius_m: missing"),
-    ("x_m = 0, y_m = 5", "x_m = 50, y_m = 5", "acts[3].gap: lies beside the plot"),
-    ("years = [2010, 2013]", "years = [2010, 2093]", "acts[4].years[1]: 2093 is not a year"),
-    ("density_ha = 1500", "density_ha = 1e300", "acts[4].density_ha"),
+    (", radius_m = 2.5 }\n", " }\n", "acts[11].gap.radius_m: missing"),
+    ("x_m = 0, y_m = 5", "x_m = 50, y_m = 5", "acts[11].gap: lies beside the plot"),
+    ("years = [2010, 2013]", "years = [2010, 2093]", "acts[12].years[1]: 2093 is not a year"),
+    ("density_ha = 1500", "density_ha = 1e300", "acts[12].density_ha"),
     (ACT, f'[[acts]]\nkind = "fell"\nyear = 2001\ntree_ids = [999]\n{ACT}', "in 2001: no living"),
     (ACT, f'[[acts]]\nkind = "burn"\nyear = 2001\n{ACT}', "acts[0]: unknown kind 'burn'"),
 ]

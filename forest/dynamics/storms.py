@@ -126,13 +126,16 @@ class Storms:
         InputError
             If there is no such storm.
         """
-        storm = Storm.of("Stand.blow", stand.year, speed_m_s, direction_deg)
+        storm = Storm.of(
+            "Stand.blow", year=stand.year, speed_m_s=speed_m_s, direction_deg=direction_deg
+        )
         none = np.zeros(len(stand.rows.tree_id), np.bool_)
         return self._throw(stand, measures, storm, ~none, none)
 
     def critical(self, stand: Stand, direction_deg: float) -> Columns:
         """Find the storms of a direction that the trees do not withstand; none falls."""
-        Storm.of("Stand.critical_wind", stand.year, 1.0, direction_deg)
+        given = {"year": stand.year, "speed_m_s": 1.0, "direction_deg": direction_deg}
+        Storm.of("Stand.critical_wind", **given)
         measures = stand.measure()
         due = self._due_rows(stand, measures)
         n = len(due)

@@ -21,7 +21,7 @@ from forest.environment.dormant import Hold
 from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
 from forest.environment.marker_buds import BudSpace, apply_space
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
-from forest.environment.obstacles import Box, Mesh, Solid
+from forest.environment.obstacles import Box, Mesh, Solid, solid_places
 from forest.environment.plant_area import PlantArea
 from forest.environment.rendered_kernels import Looks
 from forest.environment.rendered_light import RenderedLight, RenderedSpec
@@ -142,6 +142,17 @@ class Surroundings:
     def solid(self) -> Solid:
         """The voxels that obstacles fill."""
         return self._light.solid
+
+    def blocked(
+        self, x: NDArray[Any], y: NDArray[Any], solid: Solid | None = None
+    ) -> NDArray[np.bool_]:
+        """Tell at which places, m, no tree can stand: its foot would lie in an obstacle.
+
+        `solid` is what obstacles that are to come fill; default: those that stand.
+        """
+        solid = self.solid if solid is None else solid
+        feet = np.column_stack((x, y, np.zeros(len(x))))
+        return solid_places(solid, np.zeros(3, np.int64), feet, self.voxel_m)
 
     def expose(
         self,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forest.dynamics.planting import seedlings
 from forest.errors import InputError
+from forest.establishment import check_free
 from forest.inventory.fitting import aged, stretched, thickened
 from forest.inventory.nursery import Donor, Found, Wanted, search
 from forest.measure.trees import BREAST_HEIGHT_M
@@ -116,6 +117,7 @@ def settle(
     """
     scenario = stand.scenario
     x, y, species = scenario.planting_positions()
+    check_free(stand, x, y, where="planting.trees[{}]")
     rows = seedlings(
         x,
         y,

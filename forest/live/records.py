@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,9 @@ from forest._threads import thread_count
 from forest.record import ledger
 from forest.record.checkpoint import remove_checkpoints
 from forest.record.export import whole_file
+from forest.record.run import open_run
 from forest.record.schema import ALL_TABLES
-from forest.simulation import stored_tables, writer_of
+from forest.simulation import stored_tables, with_meshes, writer_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,9 +62,14 @@ def _with_population(records: Sequence[YearRecord]) -> list[dict[str, Mapping[st
 
 
 def write_run(
-    scenario: Scenario, records: Sequence[YearRecord], path: Path, *, overwrite: bool
+    scenario: Scenario,
+    records: Sequence[YearRecord],
+    path: Path,
+    *,
+    overwrite: bool,
+    say: Callable[[str], None],
 ) -> None:
-    """Write the run file of some years, whole or not at all."""
+    """Write the run file of some years, whole or not at all; then the surfaces of sample trees."""
     with (
         whole_file(path, overwrite=overwrite) as draft,
         writer_of(scenario, draft, threads=thread_count()) as writer,
@@ -72,3 +78,4 @@ def write_run(
             writer.append_year(record.year, record.tables, record.samples)
         writer.finish()
     remove_checkpoints(path)  # of what was replaced
+    with_meshes(open_run(path), say).close()

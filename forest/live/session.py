@@ -45,7 +45,8 @@ class LiveSession:
     save_to : path, optional
         The session's scenario file, written anew, whole or not at all, after each act and step.
     say : callable, optional
-        Told how the nursery goes on where the stand starts from an inventory.
+        Told how the nursery goes on where the stand starts from an inventory, and of surfaces that
+        are written.
 
     Attributes
     ----------
@@ -61,6 +62,7 @@ class LiveSession:
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._base = scenario
+        self._say = say
         self._save_to = None if save_to is None else Path(save_to)
         self._acts: list[dict[str, Any]] = []
         self._pending: list[dict[str, Any]] = []
@@ -269,7 +271,7 @@ class LiveSession:
         self._keep()
 
     def write_run(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write a run file of the years so far: the tables of the headless run.
+        """Write a run file of the years so far, and what goes with it, as the headless run does.
 
         Raises
         ------
@@ -279,7 +281,7 @@ class LiveSession:
         if not self._records:
             raise InputError("no year is done", where="write_run", expected="a step before it")
         scenario = self._with([])
-        write_run(scenario, self._records, Path(path), overwrite=overwrite)
+        write_run(scenario, self._records, Path(path), overwrite=overwrite, say=self._say)
 
     # ------------------------------------------------------------------ inside
 

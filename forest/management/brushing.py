@@ -22,14 +22,14 @@ from forest.environment.dormant import (
     Hold,
     find_metamer,
 )
-from forest.environment.obstacles import Solid
+from forest.environment.obstacles import Solid, solid_places
 from forest.environment.symmetry import mirror, shifts_of, turn, unite
 from forest.errors import InputError
 from forest.scenario.strokes import Stroking, check_stroke
 from forest.species.schema import Refusal
 from forest.species.text import input_error
-from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, TERMINAL
-from forest.trees.table import row_of
+from forest.trees.metamers import BRANCHED, CONTINUED, LATERAL, TERMINAL, Arena
+from forest.trees.table import Trees, row_of
 
 if TYPE_CHECKING:
     from forest.stand import Stand
@@ -69,14 +69,15 @@ class _Record(NamedTuple):
     end: int
 
 
-def draw(stroke: Stroking, stand: Stand, where: str) -> Drawn:
+def draw(stroke: Stroking, stand: Stand, arena: Arena, trees: Trees, where: str) -> Drawn:
     """Find where a stroke runs and what it holds; changes nothing.
 
     Parameters
     ----------
     stroke : Stroking
     stand : Stand
-        As it is before the stroke.
+    arena, trees : Arena, Trees
+        Where its tree is, as it is before the stroke.
     where : str
         Names a key of it in messages.
 
@@ -88,41 +89,40 @@ def draw(stroke: Stroking, stand: Stand, where: str) -> Drawn:
     path = np.array(stroke.points_m, np.float64).reshape(-1, 3)
     hold = None
     if stroke.tree_id is not None:
-        row = row_of(stand.rows, stroke.tree_id, where=where.format("tree_id"))
-        start = int(stand.rows.start[row])
+        row = row_of(trees, stroke.tree_id, where=where.format("tree_id"))
         if stroke.from_metamer is not None:
-            k = start + _metamer(stroke, "from_metamer", stand, row, where)
-            foot = np.array([stand.rows.x[row], stand.rows.y[row], 0.0])
-            tip = stand.arena.metamers.tip[k].astype(np.float64)
+            k = _metamer(stroke, "from_metamer", arena, trees, row, where)
+            foot = np.array([trees.x[row], trees.y[row], 0.0])
+            tip = arena.metamers.tip[k].astype(np.float64)
             path = np.concatenate(((foot + tip)[None], path))
         if stroke.metamer is not None:
-            k = start + _metamer(stroke, "metamer", stand, row, where)
-            hold = _hold(stroke, int(stand.arena.metamers.state[k]), where)
+            k = _metamer(stroke, "metamer", arena, trees, row, where)
+            hold = _hold(stroke, int(arena.metamers.state[k]), where)
     radius = np.array(stroke.radius_m)
     if len(radius) == 1:
         radius = np.repeat(radius, len(path))
     elif len(radius) < len(path):
         radius = np.concatenate((radius[:1], radius))
     try:
-        check_stroke(
-            stroke, "", stand.scenario.environment, [(x, y, z) for x, y, z in path.tolist()]
-        )
+        whole = [(x, y, z) for x, y, z in path.tolist()]
+        check_stroke(stroke, "", stand.scenario.environment, stand.scenario.plot, whole)
     except Refusal as refused:
         place = where.format(refused.key)
         raise input_error(refused.what, where=place, expected=refused.expected) from None
     return Drawn(stroke, path, radius, hold)
 
 
-def _metamer(stroke: Stroking, key: str, stand: Stand, row: int, where: str) -> int:
+def _metamer(stroke: Stroking, key: str, arena: Arena, trees: Trees, row: int, where: str) -> int:
+    """Give the place in the arena of the metamer that a key names."""
     serial = getattr(stroke, key)
-    place = find_metamer(stand.arena.metamers, stand.rows, row, serial)
+    place = find_metamer(arena.metamers, trees, row, serial)
     if place < 0:
         raise InputError(
             f"tree {stroke.tree_id} has no metamer {serial}",
             where=where.format(key),
             expected="a serial number of the tree's skeleton",
         )
-    return place
+    return int(trees.start[row]) + place
 
 
 def _hold(stroke: Stroking, state: int, where: str) -> Hold:
@@ -176,16 +176,9 @@ def markers_of(
 
 def outside(solid: Solid, points: NDArray[np.float64], voxel_m: float) -> NDArray[np.bool_]:
     """Tell which points lie above the ground and in no obstacle."""
+    no_voxel = np.zeros(3, np.int64)
     free: NDArray[np.bool_] = points[:, 2] >= 0.0
-    if solid.mask.size == 1:
-        return free
-    place = np.floor(points / voxel_m).astype(np.int64) - solid.origin
-    if solid.periodic:
-        place[:, :2] %= solid.shape
-    x, y, z = np.clip(place, 0, np.array(solid.mask.shape[::-1]) - 1).T
-    there = np.all((place >= 0) & (place < solid.mask.shape[::-1]), axis=1)
-    free &= ~(there & (solid.mask[z, y, x] != 0))
-    return free
+    return free & ~solid_places(solid, no_voxel, points, voxel_m)
 
 
 class Brush:

@@ -368,6 +368,7 @@ class Hand:
         stand, where = cast("Stand", self), "Stand.bend"
         act = Bending.of(where, tree_id=tree_id, metamer=metamer, to_m=to_m)
         row_of(stand.rows, act.tree_id, where=where)
+        where += ": {}"
         shape_to_come(stand, act.tree_id, [], [(act, where)], stand.surroundings.solid)
         return doing.bend(stand, BY_HAND, act, stand.measure(), where)[1]
 
@@ -393,7 +394,7 @@ class Hand:
         stand, where = cast("Stand", self), "Stand.obstacle"
         act = ObstacleChange.of(where, **change)
         standing = np.ones(len(stand.rows.tree_id), np.bool_)
-        found = change_of(act, stand, stand.obstacles.now, standing, where)
+        found = change_of(act, stand, stand.obstacles.now, standing, where + ": {}")
         kappa = self._traits.of["branch_pipe"]
         doing.change_obstacle(stand, BY_HAND, found, kappa, stand.measure())
         return len(found.cuts)
@@ -425,8 +426,8 @@ class Hand:
         stand, where = cast("Stand", self), "Stand.stroke"
         checked = Stroking.of(where, points_m=points_m, radius_m=radius_m, **stroke)
         with _one_line(where):
-            check_stroke(checked, "", stand.scenario.environment)
-        drawn = draw(checked, stand, where + ": {}")
+            check_stroke(checked, "", stand.scenario.environment, stand.scenario.plot)
+        drawn = draw(checked, stand, stand.arena, stand.rows, where + ": {}")
         return doing.stroke(stand, BY_HAND, drawn, stand.measure())
 
 
@@ -444,7 +445,8 @@ def _pattern(
     shares = {name: use.share for name, use in stand.scenario.species.items()}
     with _one_line(where):
         check_planted(act, "", stand.scenario.plot, shares)
-    return fill(act, stand, stand.rows.x, stand.rows.y, stand.treatments.number + 1)
+    solid, number = stand.surroundings.solid, stand.treatments.number + 1
+    return fill(act, stand, stand.rows.x, stand.rows.y, number, solid)
 
 
 def _fits(stand: Stand, rule: Thinning | Harvesting, where: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import ActError, InputError
+from forest.establishment import check_free
 from forest.management.brushing import Drawn, draw
 from forest.management.filling import pattern_places
 from forest.management.selection import Mask, census_of, to_harvest, to_prune, to_thin
@@ -104,9 +105,10 @@ class YearOfActs(NamedTuple):
             (b, f"acts[{i}].{{}}") for i, b in self.bendings.items() if b.tree_id == tree_id
         ]
         cuts = [*(change.cuts for change in self.changes.values()), *self.prunings.values()]
-        return shape_to_come(stand, tree_id, cuts, bendings, self._solid(stand))
+        return shape_to_come(stand, tree_id, cuts, bendings, self.solid(stand))
 
-    def _solid(self, stand: Stand) -> Solid:
+    def solid(self, stand: Stand) -> Solid:
+        """Give the voxels that obstacles fill after it."""
         if not self.changes:
             return stand.surroundings.solid
         return stand.surroundings.solid_of(list(self.changes.values())[-1].obstacles)
@@ -117,10 +119,10 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
 
     First trees are marked, then obstacles change, it is pruned, bent, felled and planted, then
     strokes are laid, each kind in the order of the file. Marks are given to the stand as it is
-    before. A thinning
-    or harvest sees what those before it leave; a pruning that chooses trees by rule, and a
-    pattern of planting, see what all of them leave. Triggers see the stand before all acts.
-    Nothing is changed here, so that a year is acted on wholly or not at all.
+    before. A thinning or harvest sees what those before it leave; a pruning that chooses trees by
+    rule, and a pattern of planting, see what all of them leave. Planting sees the obstacles as
+    they are then, and a stroke its tree as it is pruned and bent. Triggers see the stand before
+    all acts. Nothing is changed here, so that a year is acted on wholly or not at all.
 
     Parameters
     ----------
@@ -151,28 +153,24 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     census = census_of(stand, measures)
     standing = np.ones(len(census.tree_id), np.bool_)
     first = stand.treatments.number + 1
-    numbers = {i: first + k for k, (i, _) in enumerate(due)}
-    for i, act in due:
+    for k, (i, act) in enumerate(due):
         try:
-            if isinstance(act, Prune | Bend | ChangeObstacle):
+            if isinstance(act, Prune | Bend | ChangeObstacle | Plant | Stroke):
                 continue
-            if isinstance(act, Stroke):
-                plan.strokes[i] = draw(act, stand, f"acts[{i}].{{}} in {year}")
-            elif isinstance(act, Mark):
+            if isinstance(act, Mark):
                 rows = chosen_rows(act, stand, census, standing, f"acts[{i}].{{}} in {year}", plan)
                 plan.markings[i] = Marked(act.mark, census.tree_id[rows].tolist())
-            elif isinstance(act, Plant):
-                plan.plantings[i] = _places(act, stand, census, standing, plan, numbers[i])
             else:
                 where = f"acts[{i}]"
                 gone = [name for done in plan.fellings.values() for name in done.residual]
-                felling = _felling(act, stand, census, standing, gone, numbers[i], where, plan)
+                felling = _felling(act, stand, census, standing, gone, first + k, where, plan)
                 plan.fellings[i] = felling
                 standing &= ~np.isin(census.tree_id, felling.tree_ids)
         except InputError as refusal:
             raise ActError(str(refusal)) from None
     try:
         _plan_shapes(stand, year, due, plan, census, standing)
+        _plan_new(stand, year, due, plan, census, standing, first)
     except InputError as refusal:
         raise ActError(str(refusal)) from None
     return plan
@@ -201,6 +199,28 @@ def _plan_shapes(
             plan.shape_of(stand, act.tree_id)
 
 
+def _plan_new(
+    stand: Stand,
+    year: int,
+    due: list[tuple[int, Act]],
+    plan: YearOfActs,
+    census: Census,
+    standing: Mask,
+    first: int,
+) -> None:
+    """Find out what is planted and which strokes are drawn; both see what the others leave."""
+    for k, (i, act) in enumerate(due):
+        where = f"acts[{i}].{{}} in {year}"
+        if isinstance(act, Plant):
+            plan.plantings[i] = _places(act, stand, census, standing, plan, first + k, where)
+        elif isinstance(act, Stroke):
+            place, trees = stand.arena, stand.rows
+            if act.tree_id is not None:
+                row_of(trees, act.tree_id, where=where.format("tree_id"))
+                place, trees = plan.shape_of(stand, act.tree_id)
+            plan.strokes[i] = draw(act, stand, place, trees, where)
+
+
 def change_of(
     act: ObstacleChange,
     stand: Stand,
@@ -217,7 +237,10 @@ def change_of(
         raise input_error(refused.what, where=place, expected=refused.expected) from None
     if act.remove is not None:
         return Change(after, {})
-    solid = stand.surroundings.solid_of(after)
+    try:
+        solid = stand.surroundings.solid_of(after)
+    except InputError as refused:
+        raise InputError(str(refused), where=where.format(key)) from None
     return Change(after, cuts_inside(stand, solid, standing, where=where.format(key)))
 
 
@@ -285,20 +308,33 @@ def _felling(
 
 
 def _places(
-    act: Plant, stand: Stand, census: Census, standing: Mask, plan: YearOfActs, number: int
+    act: Plant,
+    stand: Stand,
+    census: Census,
+    standing: Mask,
+    plan: YearOfActs,
+    number: int,
+    where: str,
 ) -> Places:
+    solid = plan.solid(stand)
     if act.pattern is None:
+        check_free(stand, act.x_m, act.y_m, where=where.format("x_m[{}]"), solid=solid)
         return Places(act.x_m, act.y_m, act.names(stand.species_names))
     planned = list(plan.plantings.values())
     x = np.concatenate([census.x[standing], *(np.asarray(p.x, np.float64) for p in planned)])
     y = np.concatenate([census.y[standing], *(np.asarray(p.y, np.float64) for p in planned)])
-    return fill(act, stand, x, y, number)
+    return fill(act, stand, x, y, number, solid)
 
 
 def fill(
-    act: Planted, stand: Stand, x: NDArray[np.float64], y: NDArray[np.float64], number: int
+    act: Planted,
+    stand: Stand,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    number: int,
+    solid: Solid,
 ) -> Places:
-    """Find the places of a pattern between stems."""
+    """Find the places of a pattern between stems and obstacles."""
     scenario = stand.scenario
     names, shares = act.mix({name: use.share for name, use in scenario.species.items()})
     new_x, new_y, kind = pattern_places(
@@ -310,7 +346,8 @@ def fill(
         scenario.seed,
         time=number * _TIMES + stand.steps + 1,
     )
-    return Places(new_x.tolist(), new_y.tolist(), [names[k] for k in kind])
+    free = ~stand.surroundings.blocked(new_x, new_y, solid)
+    return Places(new_x[free].tolist(), new_y[free].tolist(), [names[k] for k in kind[free]])
 
 
 def bearing(word: str, stand: Stand, census: Census, plan: YearOfActs | None) -> Mask:

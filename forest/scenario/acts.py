@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from forest.errors import nearest
 from forest.scenario.choosing import MOST_IDS, ChosenTrees, Id, Word
@@ -17,7 +17,7 @@ from forest.scenario.regions import Region, check_region
 from forest.scenario.shaping import Bend, ChangeObstacle, Mark
 from forest.scenario.strokes import Stroke
 from forest.scenario.timing import Timing, check_timing
-from forest.species.schema import Refusal, Table, quantity, refusal
+from forest.species.schema import Refusal, Table, quantity
 
 _Place = Annotated[float, Field(ge=0, le=10000)]
 _Spacing = Annotated[float, Field(ge=0.05, le=10000)]
@@ -73,14 +73,6 @@ class Branches(Table):
                 f"{self.to_m:g} lies below from_m", key="to_m", expected=f"{self.from_m:g} or more"
             )
         return self
-
-    @classmethod
-    def of(cls, where: str, **given: Any) -> Self:
-        """Check a choice that was given in Python; `where` names it in messages."""
-        try:
-            return cls(**given)
-        except ValidationError as error:
-            raise refusal(error, cls, where=where) from None
 
     @property
     def spread_deg(self) -> float:
@@ -244,14 +236,6 @@ class Planted(Table):
                 raise Refusal(what, key="shares", expected="one for each")
             if not sum(self.shares):
                 raise Refusal("every share is 0", key="shares", expected="a share above 0")
-
-    @classmethod
-    def of(cls, where: str, **given: Any) -> Self:
-        """Check a planting that was given in Python; `where` names it in messages."""
-        try:
-            return cls(**given)
-        except ValidationError as error:
-            raise refusal(error, cls, where=where) from None
 
     def names(self, known: Sequence[str]) -> list[str]:
         """Name the species of each tree at given places, of a scenario with these."""

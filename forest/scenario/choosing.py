@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from forest.scenario.cuttings import Rule
 from forest.species.schema import Refusal, quantity
 
 Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
+
+
+def _is_word(text: str) -> str:
+    if not re.fullmatch("[a-z][a-z0-9_]{0,29}", text):
+        raise Refusal(
+            f"{text[:60]!r} is no short word",
+            expected="small letters, digits and _, a letter first, 30 at most",
+        )
+    return text
+
+
 #: What a tree can be marked with.
-Word = Annotated[str, Field(min_length=1, max_length=30, pattern=r"^[a-z][a-z0-9_]*$")]
+Word = Annotated[str, AfterValidator(_is_word)]
 MOST_IDS = 1_000_000
 
 

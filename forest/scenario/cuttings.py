@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from forest.errors import nearest
 from forest.scenario.model import Plot
 from forest.scenario.regions import Region, check_region
 from forest.scenario.timing import Timing
-from forest.species.schema import Refusal, Table, quantity, refusal
+from forest.species.schema import Refusal, Table, quantity
 
 _Name = Annotated[str, Field(min_length=1, max_length=60)]
 
@@ -47,14 +47,6 @@ class Rule(Table):
                 f"{high:g} lies below min_dbh_cm", key="max_dbh_cm", expected=f"{low:g} or more"
             )
         return self
-
-    @classmethod
-    def of(cls, where: str, **given: Any) -> Self:
-        """Check a rule that was given in Python; `where` names it in messages."""
-        try:
-            return cls(**given)
-        except ValidationError as error:
-            raise refusal(error, cls, where=where) from None
 
 
 def _only_of(rule: Table, method: str, keys: dict[str, tuple[str, ...]]) -> None:

@@ -45,7 +45,7 @@ def check_fit(scenario: Scenario) -> None:
     shares = {name: use.share for name, use in scenario.species.items()}
     regular = isinstance(scenario.planting, Regular)
     check_acts(scenario.acts, scenario.plot, shares, scenario.planned_calendar, regular)
-    check_strokes(scenario.acts, scenario.environment)
+    check_strokes(scenario.acts, scenario.environment, scenario.plot)
     check_shaping(scenario.acts, scenario.obstacles)
     residual = scenario.residual_trees
     check_residual(

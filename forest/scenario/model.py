@@ -11,7 +11,9 @@ from forest.scenario.inventory import Inventory
 from forest.species.model import Species
 from forest.species.schema import Refusal, Table, quantity
 
-Coordinate = Annotated[float, Field(ge=-1e5, le=1e5)]
+#: No place is farther from the plot's corner along any axis, m.
+FARTHEST_M = 1e5
+Coordinate = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
 _Edge = Annotated[float, Field(ge=0.5, le=10000)]
 _Spacing = Annotated[float, Field(ge=0.05, le=10000)]
@@ -334,6 +336,8 @@ class Box(Table):
                 key="max_m",
                 expected="every coordinate above that of min_m",
             )
+        if self.max_m[2] <= 0.0:
+            raise Refusal("lies below the ground", key="max_m", expected="a top above 0")
         return self
 
     def moved(self, by_m: Point) -> Box:

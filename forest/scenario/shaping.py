@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
-from pydantic import ValidationError, model_validator
+from pydantic import model_validator
 
 from forest.errors import nearest
 from forest.scenario.choosing import ChosenTrees, Id, Word
-from forest.scenario.model import Obstacle, Point
+from forest.scenario.model import FARTHEST_M, Obstacle, Point
 from forest.scenario.timing import Timing
-from forest.species.schema import Refusal, Table, quantity, refusal
+from forest.species.schema import Refusal, Table, quantity
 
 
 class Marking(ChosenTrees):
@@ -49,14 +49,6 @@ class Bending(Table):
         unit="m",
     )
 
-    @classmethod
-    def of(cls, where: str, **given: Any) -> Self:
-        """Check a bending that was given in Python; `where` names it in messages."""
-        try:
-            return cls(**given)
-        except ValidationError as error:
-            raise refusal(error, cls, where=where) from None
-
     @property
     def in_words(self) -> str:
         """Say what is done."""
@@ -90,14 +82,6 @@ class ObstacleChange(Table):
             what = "given without move" if self.move is None else "missing"
             raise Refusal(what, key="by_m", expected="move and by_m together")
         return self
-
-    @classmethod
-    def of(cls, where: str, **given: Any) -> Self:
-        """Check a change that was given in Python; `where` names it in messages."""
-        try:
-            return cls(**given)
-        except ValidationError as error:
-            raise refusal(error, cls, where=where) from None
 
     @property
     def target(self) -> str:
@@ -134,7 +118,16 @@ class ObstacleChange(Table):
         if self.by_m is None:
             return tuple(o for o in obstacles if o.name != self.target)
         by = self.by_m
-        return tuple(o.moved(by) if o.name == self.target else o for o in obstacles)
+        after = tuple(o.moved(by) if o.name == self.target else o for o in obstacles)
+        for o in after:
+            places = (*o.min_m, *o.max_m) if o.kind == "box" else o.at_m
+            if max(map(abs, places)) > FARTHEST_M:
+                raise Refusal(
+                    f"{self.target!r} would be moved too far",
+                    key="by_m",
+                    expected=f"places within {FARTHEST_M:g} m",
+                )
+        return after
 
 
 class ChangeObstacle(ObstacleChange, Timing):

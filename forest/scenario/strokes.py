@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise, product
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from forest.scenario import files
-from forest.scenario.model import Environment, Point
+from forest.scenario.model import Environment, Plot, Point
 from forest.scenario.timing import Timing
-from forest.species.schema import Refusal, Table, quantity, refusal
+from forest.species.schema import Refusal, Table, quantity
 
 #: Markers that a stroke may lay, all its copies together.
 MOST_MARKERS = 10_000_000
 _MOST_STEPS = 10_000
+#: How far beyond the plot a stroke may reach, m: farther than any tree leans out of it.
+BEYOND_M = 100.0
+_Corner = tuple[float, float]
 
 _Radius = Annotated[float, Field(ge=1e-3, le=1000)]
 _Count = Annotated[int, Field(ge=1, le=10_000)]
@@ -194,14 +197,6 @@ class Stroking(Table):
             )
         return self
 
-    @classmethod
-    def of(cls, where: str, **given: Any) -> Self:
-        """Check a stroke that was given in Python; `where` names it in messages."""
-        try:
-            return cls(**given)
-        except ValidationError as error:
-            raise refusal(error, cls, where=where) from None
-
     @property
     def ids(self) -> tuple[int, ...]:
         """The tree that it names, if any."""
@@ -242,17 +237,21 @@ class Stroke(Stroking, Timing):
     kind: Literal["stroke"] = quantity("stroke", "kind of act", unit="")
 
 
-def check_strokes(acts: Sequence[Timing], environment: Environment) -> None:
+def check_strokes(acts: Sequence[Timing], environment: Environment, plot: Plot) -> None:
     """Refuse strokes that nothing can perceive, or of more markers than fit."""
     for i, act in enumerate(acts):
         if isinstance(act, Stroke):
-            check_stroke(act, f"acts[{i}]", environment)
+            check_stroke(act, f"acts[{i}]", environment, plot)
 
 
 def check_stroke(
-    stroke: Stroking, key: str, environment: Environment, path: Sequence[Point] | None = None
+    stroke: Stroking,
+    key: str,
+    environment: Environment,
+    plot: Plot,
+    path: Sequence[Point] | None = None,
 ) -> None:
-    """Refuse a stroke that does not fit the environment.
+    """Refuse a stroke that does not fit the environment and the plot.
 
     Parameters
     ----------
@@ -260,6 +259,7 @@ def check_stroke(
     key : str
         Where it stands.
     environment : Environment
+    plot : Plot
     path : sequence of points, optional
         The whole path, m, where it is known; default: `points_m`.
     """
@@ -271,14 +271,64 @@ def check_stroke(
             f"{stroke.copies:,} copies", key=f"{start}tiling", expected=f"at most {MOST_MARKERS:,}"
         )
     path = stroke.points_m if path is None else path
-    wide = max(stroke.radius_m)
+    cell = stroke.cell_m(environment.markers.spacing_m)
+    wide = max(max(stroke.radius_m), cell)  # a path costs its cells, if it is ever so thin
     length = sum(math.dist(a, b) for a, b in pairwise(path))
     volume = math.pi * wide**2 * (length + 4.0 / 3.0 * wide)  # of the union, at most
-    markers = volume / stroke.cell_m(environment.markers.spacing_m) ** 3 * stroke.copies
+    markers = volume / cell**3 * stroke.copies
     if markers > MOST_MARKERS:
         name = "markers_m3" if stroke.markers_m3 is not None else "radius_m"
         raise Refusal(
             f"up to {markers:.3g} markers",
             key=f"{start}{name}",
-            expected=f"at most {MOST_MARKERS:,}, by less volume or more spacing",
+            expected=f"at most {MOST_MARKERS:,}, by less length, volume or copies, or more spacing",
         )
+    if path:
+        _check_near(stroke, start, plot, path)
+
+
+def _check_near(stroke: Stroking, start: str, plot: Plot, path: Sequence[Point]) -> None:
+    """Refuse a stroke, or a copy of it, that no tree of the plot can reach."""
+    radius = max(stroke.radius_m)
+    up = 0.0
+    for key, corners in _extents(stroke, path):
+        for x, y in corners:
+            for at, size in ((x, plot.size_m[0]), (y, plot.size_m[1])):
+                if not -BEYOND_M <= at <= size + BEYOND_M:
+                    raise Refusal(
+                        f"reaches to ({x:g}, {y:g})",
+                        key=f"{start}{key}",
+                        expected=f"places on the plot, or within {BEYOND_M:g} m of it",
+                    )
+    if stroke.tiling is not None:
+        for shift, n in zip(stroke.tiling.shifts_m, stroke.tiling.counts, strict=True):
+            up += max(0.0, shift[2] * (n - 1))
+    if max(z for _, _, z in path) + up + radius < 0.0:
+        raise Refusal("lies below the ground", key=f"{start}points_m", expected="a place above it")
+
+
+def _extents(stroke: Stroking, path: Sequence[Point]) -> Iterator[tuple[str, list[_Corner]]]:
+    """List the corners, along x and y, of the path and of what each symmetry makes of it."""
+    sides = [(min(v), max(v)) for v in list(zip(*path, strict=True))[:2]]
+    corners = list(product(*sides))
+    yield "points_m", corners
+    if stroke.mirror is not None:
+        m = stroke.mirror
+        a = 2.0 * math.radians(m.normal_deg)
+        c, s = math.cos(a), math.sin(a)
+        away = [(x - m.x_m, y - m.y_m) for x, y in corners]
+        corners += [(m.x_m - c * x - s * y, m.y_m - s * x + c * y) for x, y in away]
+        yield "mirror", corners
+    if stroke.rotation is not None:
+        r = stroke.rotation
+        turns = [2.0 * math.pi * k / r.times for k in range(r.times)]
+        cosines = [(math.cos(a), math.sin(a)) for a in turns]
+        away = [(x - r.x_m, y - r.y_m) for x, y in corners]
+        corners = [
+            (r.x_m + c * x - s * y, r.y_m + s * x + c * y) for c, s in cosines for x, y in away
+        ]
+        yield "rotation", corners
+    if stroke.tiling is not None:
+        for (dx, dy, _), n in zip(stroke.tiling.shifts_m, stroke.tiling.counts, strict=True):
+            corners += [(x + dx * (n - 1), y + dy * (n - 1)) for x, y in corners]
+        yield "tiling", corners

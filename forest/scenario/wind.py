@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
-from pydantic import ValidationError
-
-from forest.species.schema import Refusal, Table, quantity, refusal
+from forest.species.schema import Refusal, Table, quantity
 
 if TYPE_CHECKING:
     from forest.scenario.scenario import Scenario
@@ -30,14 +28,6 @@ class Storm(Table):
         ge=-360,
         le=360,
     )
-
-    @classmethod
-    def of(cls, where: str, year: int, speed_m_s: float, direction_deg: float) -> Self:
-        """Check a storm that was given in Python; `where` names it in messages."""
-        try:
-            return cls(year=year, speed_m_s=speed_m_s, direction_deg=direction_deg)
-        except ValidationError as error:
-            raise refusal(error, cls, where=where) from None
 
 
 class YearlyStorms(Table):

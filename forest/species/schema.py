@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Iterator, Mapping
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Self, Union, get_args, get_origin
 
 import annotated_types
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -48,6 +48,20 @@ class Table(BaseModel):
     @classmethod
     def _plain(cls, data: Any) -> Any:
         return as_plain(data)
+
+    @classmethod
+    def of(cls, where: str, **given: Any) -> Self:
+        """Check keys that were given in Python; `where` names what they are of in messages.
+
+        Raises
+        ------
+        InputError
+            If one is missing, unknown or not allowed.
+        """
+        try:
+            return cls(**given)
+        except ValidationError as error:
+            raise refusal(error, cls, where=where) from None
 
 
 def as_plain(data: Any, depth: int = 0) -> Any:

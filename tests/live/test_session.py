@@ -19,6 +19,7 @@ from pandas.testing import assert_frame_equal
 from forest.errors import ActError, InputError
 from forest.live import LiveSession
 from forest.record.run import open_run
+from forest.record.schema import ACT_KINDS
 from forest.scenario import Scenario
 from forest.simulation import simulate
 from forest.stand import Stand
@@ -26,12 +27,16 @@ from tests.tiny import assert_same_runs, assert_same_years, steps, tiny, write_t
 
 SETTINGS = (
     "years=3",
+    "environment={shadow={}, canopy={}, markers={}}",
     "planting={kind='random', density_ha=600}",
     "output={sample_trees={ids=[1, 4], dbh_quantiles=[0.5]}}",
     "acts=[{kind='prune', year=2002, all_trees=true, below_share=0.2},"
     "{kind='thin', when='n_ha > 300', from_year=2002, method='random', share_n=0.2, at_most=1}]",
 )
-KINDS = ("step", "step", "fell", "prune", "lift", "plant", "thin", "harvest", "undo")
+KINDS = (
+    *("step", "step", "step", "undo", "fell", "prune", "lift", "plant", "thin", "harvest"),
+    *("mark", "fell marked", "bend", "wall", "move", "remove", "stroke", "stroke of a branch"),
+)
 
 
 def do(session: LiveSession, kind: str, draw: int) -> None:
@@ -54,8 +59,40 @@ def do(session: LiveSession, kind: str, draw: int) -> None:
         session.act(kind="plant", species="fagus_sylvatica", **where)
     elif kind == "thin":
         session.act(kind="thin", method="below", share_n=0.3)
-    else:
+    elif kind == "harvest":
         session.act(kind="harvest", method="diameter_limit", limit_cm=1.0)
+    else:
+        shape(session, kind, draw, tree_id)
+
+
+def shape(session: LiveSession, kind: str, draw: int, tree_id: int) -> None:
+    """Do something that marks or shapes trees, or changes what is around them."""
+    x, y = draw % 97 / 10, draw % 89 / 10
+    if kind == "mark":
+        session.act(kind="mark", tree_ids=[tree_id], mark="out")
+    elif kind == "fell marked":
+        session.act(kind="fell", marked="out")
+    elif kind == "wall":
+        box = {"min_m": [x, y, draw % 7 / 10], "max_m": [x + 0.5, y + 2, 2]}
+        session.act(kind="obstacle", add={"kind": "box", "name": f"wall {draw % 3}", **box})
+    elif kind == "move":
+        session.act(kind="obstacle", move=f"wall {draw % 3}", by_m=[0.3, 0, 0.2])
+    elif kind == "remove":
+        session.act(kind="obstacle", remove=f"wall {draw % 3}")
+    elif kind == "stroke":
+        turns = {"x_m": 5, "y_m": 5, "times": 2 + draw % 3}
+        path = {"points_m": [[x, y, 0.3], [5, 5, 1.5]], "steps": 1 + draw % 3}
+        session.act(kind="stroke", radius_m=0.4, rotation=turns, **path)
+    else:
+        there = session.skeleton(tree_id)
+        k = draw % len(there)
+        metamer, end = int(there.serial[k]), there.end[k]
+        to = (end + np.array([0.1, 0.05, 0.02 * (draw % 4)])).tolist()
+        if kind == "bend":
+            session.act(kind="bend", tree_id=tree_id, metamer=metamer, to_m=to)
+        else:
+            bud = {"tree_id": tree_id, "metamer": metamer, "from_metamer": metamer}
+            session.act(kind="stroke", points_m=[to], radius_m=0.3, hold_steps=draw % 3, **bud)
 
 
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -86,6 +123,12 @@ def worked() -> LiveSession:
         session.step()
     session.act(kind="fell", tree_ids=[2], cause="thinning")
     session.act(kind="prune", all_trees=True, below_share=0.4)
+    session.act(kind="mark", tree_ids=[3], mark="crop")
+    roof = {"kind": "box", "name": "roof", "min_m": [0, 0, 5], "max_m": [2, 2, 6]}
+    session.act(kind="obstacle", add=roof)
+    session.act(kind="stroke", points_m=[[5, 5, 1]], radius_m=0.5)
+    to = session.skeleton(3).end[1] + np.array([0.02, 0.01, 0.0])
+    session.act(kind="bend", tree_id=3, metamer=1, to_m=to.tolist())
     session.step()
     session.act(
         kind="harvest", method="gap", gap={"kind": "circle", "x_m": 3, "y_m": 3, "radius_m": 2}
@@ -104,15 +147,27 @@ def test_its_run_file_is_the_headless_one(worked: LiveSession, tmp_path: Path) -
     assert live.complete
     assert live.scenario == run.scenario
     assert live.digest == run.digest
-    kinds = {"planted", "died", "felled", "pruned"}
+    kinds = {"planted", "died", "felled", "pruned", "marked", "bent"}
     assert set(run.events.kind) >= kinds - {"died"}
-    assert set(run.treatments.kind) == {"plant", "prune", "thin", "fell", "harvest"}
+    assert set(run.treatments.kind) == set(ACT_KINDS)
     tables = worked.tables
     assert tables.keys() == set(run.tables)
     for name, frame in tables.items():
         assert_frame_equal(frame, run.read(name), check_exact=True)
     with pytest.raises(InputError, match="exists already"):
         worked.write_run(tmp_path / "live.h5")
+
+
+def test_its_run_file_has_the_surfaces_that_were_asked_for(tmp_path: Path) -> None:
+    scenario = tiny("output.sample_trees={ids=[1, 4], meshes='ply'}", "years=2")
+    session = LiveSession(scenario)
+    session.step(), session.step()
+    session.write_run(tmp_path / "live.h5")
+    simulate(session.scenario, tmp_path / "run.h5").close()
+    written = sorted((tmp_path / "run_meshes").iterdir())
+    assert written
+    for path in written:
+        assert (tmp_path / "live_meshes" / path.name).read_bytes() == path.read_bytes()
 
 
 def test_before_the_first_step(tmp_path: Path) -> None:

@@ -166,6 +166,33 @@ def stand_serial(skeleton, n: int) -> int:
     return int(skeleton.serial[n - 1])
 
 
+def test_a_stroke_begins_where_its_metamer_is_bent_to() -> None:
+    """Strokes are the last acts of a year: they see the tree as it is pruned and bent."""
+    grown = sketched()
+    shape = grown.skeleton(1)
+    k = int(np.argmax(shape.end[:, 2]))
+    metamer, to = int(shape.serial[k]), shape.end[k] + [0.1, 0.1, -0.02]
+    year = grown.year + 1
+    bend = f"{{kind='bend', year={year}, tree_id=1, metamer={metamer}, to_m={to.tolist()}}}"
+    stroke = f"kind='stroke', year={year}, radius_m=0.1, tree_id=1, from_metamer={metamer}"
+    first = f"{{kind='stroke', year=2001, points_m={STEM}, radius_m=0.2, steps=3}}"
+    stand = Stand(tree(f"acts=[{first}, {{{stroke}}}, {bend}]", "seed=1"))
+    steps(stand, 6)
+    stand.step()
+    bent = Stand(tree(f"acts=[{first}, {bend}]", "seed=1"))
+    steps(bent, 6)
+    bent.bend(1, metamer, to)
+    there = bent.skeleton(1).end[k]
+    laid = stand.surroundings.markers.laid
+    new = laid.point[laid.due == 7]
+    assert len(new) and np.linalg.norm(new - there, axis=1).max() <= 0.1 + 1e-6
+    cut = f"{{kind='prune', year={year}, tree_id=1, metamer={metamer}}}"
+    stand = Stand(tree(f"acts=[{first}, {{{stroke}}}, {cut}]", "seed=1"))
+    steps(stand, 6)
+    with pytest.raises(ActError, match=rf"acts\[1\].from_metamer in {year}: tree 1 has no metamer"):
+        stand.step()
+
+
 def test_obstacles_and_ground_stay_free() -> None:
     box = "obstacles=[{kind='box', min_m=[4.2, 3, 0], max_m=[4.4, 5, 2]}]"
     stand = Stand(tree(box))
@@ -288,6 +315,21 @@ BASE = "kind='stroke', year=2001"
         (
             "points_m=[[4,4,1]], radius_m=1, tiling={shifts_m=[[1,0,0]], counts=[1,2]}",
             "tiling.counts: 2 for 1 shifts_m",
+        ),
+        ("points_m=[[900,4,1]], radius_m=1", "points_m: reaches to (900, 4)"),
+        ("points_m=[[4,4,-3]], radius_m=1", "points_m: lies below the ground"),
+        ("points_m=[[4,4,1]], radius_m=1, mirror={x_m=900, y_m=4}", "mirror: reaches to (1796, 4)"),
+        (
+            "points_m=[[4,4,1]], radius_m=1, rotation={x_m=900, y_m=4, times=2}",
+            "rotation: reaches to (1796, 4)",
+        ),
+        (
+            "points_m=[[4,4,1]], radius_m=1, tiling={shifts_m=[[9,0,0]], counts=[20]}",
+            "tiling: reaches to (175, 4)",
+        ),
+        (
+            f"points_m=[{', '.join(200 * ['[-9e4,0,1], [9e4,0,1]'])}], radius_m=0.001",
+            "radius_m: up to 1.88e+09 markers",
         ),
         ("points_m=[[4,4,1]], radius_m=90", "radius_m: up to 1.77e+09 markers"),
         (

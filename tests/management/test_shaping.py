@@ -249,6 +249,11 @@ REFUSED = {
         "{kind='obstacle', year=2003, add={kind='box', min_m=[0,0,0], max_m=[1,1,1]}}",
         "missing key 'name'",
     ),
+    "no word at all": ("{kind='mark', year=2003, all_trees=true, mark='Two words'}", "short word"),
+    "below the ground": (
+        "{kind='obstacle', year=2003, add={kind='box', name='w', min_m=[0,0,-2], max_m=[1,1,-1]}}",
+        "add.max_m: lies below the ground",
+    ),
     "unknown wall": ("{kind='obstacle', year=2003, remove='wal'}", "no obstacle 'wal'"),
     "no distance": ("{kind='obstacle', year=2003, move='wall'}", "by_m"),
     "nothing": ("{kind='obstacle', year=2003}", "nothing to do"),
@@ -281,6 +286,49 @@ def test_refused_in_its_year() -> None:
         stand.step()
     for name, array in stand.state()[0].items():
         np.testing.assert_array_equal(array, before[0][name], name)
+
+
+BOX = {"kind": "box", "name": "wall", "min_m": [3.0, 3.0, 0.0], "max_m": [5.0, 5.0, 2.0]}
+
+
+def test_nothing_is_planted_in_an_obstacle() -> None:
+    """One tree is refused, before anything of the year is done; a pattern leaves it out."""
+    built = "obstacles=[{kind='box', min_m=[3, 3, 0], max_m=[5, 5, 2]}]"
+    with pytest.raises(InputError, match=r"planting.trees\[0\]: \(4, 4\) lies in an obstacle"):
+        Stand(tiny(*ALONE, built))
+    rows = "planting={kind='regular', spacing_m=[1, 1]}"
+    assert Stand(tiny(*ALONE, rows, built)).rows.tree_id.size == 64 - 4
+    roof = "obstacles=[{kind='box', min_m=[3, 3, 1], max_m=[5, 5, 2]}]"
+    assert Stand(tiny(*ALONE, roof)).rows.tree_id.size == 1
+    stand = Stand(tiny(*ALONE, "planting.trees=[{x_m=1, y_m=1}]"))
+    stand.obstacle(add=BOX)
+    with pytest.raises(InputError, match=r"Stand.plant: \(4, 4.5\) lies in an obstacle"):
+        stand.plant([1.5, 4.0], [2.0, 4.5])
+    assert len(stand.plant(pattern="regular", spacing_m=[1.0, 1.0], clear_m=0.1)) == 64 - 4
+
+
+def test_planting_sees_the_obstacles_of_its_year() -> None:
+    wall = "{kind='obstacle', year=2001, add={kind='box', name='w', min_m=[0,0,0], max_m=[2,2,2]}}"
+    away = "{kind='obstacle', year=2002, remove='w'}"
+    seed = "{kind='plant', year=2001, x_m=[1.5], y_m=[1.5]}"
+    with pytest.raises(ActError, match=r"acts\[0\].x_m\[0\] in 2001: \(1.5, 1.5\) lies in an ob"):
+        Stand(tiny(*ALONE, f"acts=[{seed}, {wall}]"))
+    late = seed.replace("2001", "2002")
+    stand = Stand(tiny(*ALONE, f"acts=[{wall}, {away}, {late}]"))
+    steps(stand, 2)
+    assert stand.rows.tree_id.size == 2
+
+
+def test_too_far_is_refused_where_it_stands() -> None:
+    stand = grown(years=1)
+    stand.obstacle(add={**BOX, "min_m": [0, 0, 0], "max_m": [1, 1, 1]})
+    before = stand.obstacles.now
+    with pytest.raises(InputError, match="by_m: 'wall' would be moved too far"):
+        stand.obstacle(move="wall", by_m=[1e5, 0, 0])
+    huge = {**BOX, "name": "huge", "min_m": [0, 0, 0], "max_m": [9e4, 9e4, 1]}
+    with pytest.raises(InputError, match=r"Stand.obstacle: add: obstacles: too large or"):
+        stand.obstacle(add=huge)
+    assert stand.obstacles.now == before
 
 
 def test_a_live_bend_shows_and_replays() -> None:
