@@ -174,8 +174,7 @@ class WorkPanel:
     def refresh(self) -> None:
         """List the acts that wait."""
         self._desk.app.state.live_acts = [
-            {"number": k, "text": words_of(act)}
-            for k, act in enumerate(self._desk.source.pending)
+            {"number": k, "text": words_of(act)} for k, act in enumerate(self._desk.source.pending)
         ]
         for options in self._options:
             options.refresh()
