@@ -82,6 +82,7 @@ def _turn(stage: Any) -> None:
     for _ in range(_TURNS):
         stage.plotter.camera.Azimuth(3.0)
         stage.plotter.renderer.ResetCameraClippingRange()
+        stage.window.Render()  # a screenshot alone would give the first picture again
         seen = stage.plotter.screenshot(return_img=True)
         Image.fromarray(seen).save(BytesIO(), "JPEG", quality=_QUALITY)
 
