@@ -1,6 +1,6 @@
-"""Pictures of `forest view` for its page in the docs: `python analysis/viewer_pictures.py RUN.h5`.
+"""Pictures of `forest view` for its page in the docs: `python analysis/viewer_pictures.py RUN.h5 TREE`.
 
-It starts the viewer as a user does, opens its page in a headless Chromium and saves what is seen in
+TREE is a sample tree, thick enough for bark. It starts the viewer as a user does, opens its page in a headless Chromium and saves what is seen in
 docs/gallery.
 """
 
@@ -33,7 +33,7 @@ def shoot(page: Any, name: str) -> None:
     )
 
 
-def tour(page: Any) -> None:
+def tour(page: Any, tree: str) -> None:
     """Go through the views."""
     page.wait_for_selector("#year", timeout=_PATIENCE_MS)
     shoot(page, "viewer_stand")
@@ -53,6 +53,23 @@ def tour(page: Any) -> None:
     page.wait_for_selector("#disc", timeout=_PATIENCE_MS)
     page.locator("#disc").scroll_into_view_if_needed()
     shoot(page, "viewer_tree")
+    page.fill("#find", tree)
+    page.click("#find-button")
+    page.wait_for_function(
+        "id => document.querySelector('#card-title').innerText.includes('Tree ' + id)", arg=tree
+    )
+    page.click("#shape-bark")
+    page.wait_for_function(
+        "document.querySelector('#shape-said').innerText.includes('triangles')",
+        timeout=_PATIENCE_MS,
+    )
+    page.click("#look-tree")
+    box = page.locator("#picture").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    for _ in range(5):
+        page.mouse.wheel(0, -240)
+        page.wait_for_timeout(300)
+    shoot(page, "viewer_bark")
     page.click("#year")
     page.keyboard.press("Escape")
     page.click(".v-tab:has-text('Light')")
@@ -62,6 +79,7 @@ def tour(page: Any) -> None:
     shoot(page, "viewer_slice")
     page.click("#inside-sun")
     page.wait_for_selector("#light-view", timeout=_PATIENCE_MS)
+    page.locator("#light-view").click()
     shoot(page, "viewer_light")
 
 
@@ -69,8 +87,8 @@ def main(arguments: Sequence[str]) -> None:
     """Take the pictures of a run."""
     from playwright.sync_api import sync_playwright
 
-    if len(arguments) != 1:
-        sys.exit("usage: python analysis/viewer_pictures.py RUN.h5")
+    if len(arguments) != 2:
+        sys.exit("usage: python analysis/viewer_pictures.py RUN.h5 TREE")
     code = "from forest.cli import main; main()"
     view = subprocess.Popen(
         [sys.executable, "-c", code, "view", arguments[0], "--port", "0", "--no-browser"],
@@ -88,7 +106,7 @@ def main(arguments: Sequence[str]) -> None:
             browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
             page = browser.new_page(viewport={"width": 1280, "height": 780})
             page.goto(found.group())
-            tour(page)
+            tour(page, arguments[1])
             browser.close()
     finally:
         view.terminate()
