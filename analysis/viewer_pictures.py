@@ -63,6 +63,7 @@ def tour(page: Any, tree: str) -> None:
         "document.querySelector('#shape-said').innerText.includes('triangles')",
         timeout=_PATIENCE_MS,
     )
+    page.click("#alone")
     page.click("#look-tree")
     box = page.locator("#picture").bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
@@ -70,6 +71,7 @@ def tour(page: Any, tree: str) -> None:
         page.mouse.wheel(0, -240)
         page.wait_for_timeout(300)
     shoot(page, "viewer_bark")
+    page.click("#alone")
     page.click("#year")
     page.keyboard.press("Escape")
     page.click(".v-tab:has-text('Light')")
@@ -80,6 +82,7 @@ def tour(page: Any, tree: str) -> None:
     page.click("#inside-sun")
     page.wait_for_selector("#light-view", timeout=_PATIENCE_MS)
     page.locator("#light-view").click()
+    page.evaluate("document.querySelector('.v-navigation-drawer__content').scrollTop = 0")
     shoot(page, "viewer_light")
 
 

@@ -10,18 +10,21 @@ if TYPE_CHECKING:
     from forest.viewer.app import App
 
 _MOST_METAMERS = 120_000  # of all trees that are drawn with branches unasked
-_NEAR = 0.4  # height of a tree in the picture, of the picture's, from which it is near
+_NEAR = 0.6  # height of a tree in the picture, of the picture's, from which it is near
 
 
 def trees_in_detail(app: App) -> tuple[int, ...]:
     """List the trees that are drawn with branches, of those whose branches are known.
 
-    All of them if that is switched on; else the chosen one, unless its card asks for the body, and
-    those that fill much of the picture, the nearest first, as long as they are not too many.
+    All of them if that is switched on; none where crowns make way; else the chosen one, unless its
+    card asks for the body, and those that fill much of the picture, the nearest first, as long as
+    they are not too many.
     """
     known = app.source.with_branches(app.year)
     if app.state.branches or not known:
         return known
+    if not app.stage.crowns:
+        return ()
     chosen = app.chosen if app.state.shape != "body" else None
     trees = app.trees
     rows = np.flatnonzero(np.isin(trees["tree_id"].to_numpy(), known))

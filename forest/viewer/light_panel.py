@@ -56,7 +56,7 @@ class LightPanel:
                 "light_said": "",
                 "light_image": "",
                 "light_pixels": "",
-                "light_by": "leaf",
+                "light_by": "tree",
                 "light_colours": [
                     {"title": label, "value": name} for name, label in LIGHT_COLOURS.items()
                 ],
