@@ -79,7 +79,7 @@ def main() -> None:
     chosen = sys.argv[1:]
     picture = sheet(chosen or list(preset_names()))
     to = Path(f"bark_sheet_{'_'.join(chosen)}.png") if chosen else TO / "bark_sheet.png"
-    picture.quantize(256, dither=Image.Dither.NONE).save(to, optimize=True)
+    picture.quantize(256, kmeans=2, dither=Image.Dither.NONE).save(to, optimize=True)
     print(to)
 
 

@@ -19,13 +19,14 @@ GALLERY = ROOT / "docs" / "gallery"
 _PATIENCE_MS = 240_000
 
 
-def shoot(page: Any, name: str) -> None:
-    """Save the page as a picture of the gallery, in few colours."""
+def shoot(page: Any, name: str, *, still: bool = False) -> None:
+    """Save the page as a picture of the gallery, in few colours; `still` leaves the pointer."""
     from io import BytesIO
 
     from PIL import Image
 
-    page.mouse.move(4, 4)
+    if not still:
+        page.mouse.move(4, 4)
     page.wait_for_timeout(4000)
     image = Image.open(BytesIO(page.screenshot())).convert("RGB")
     image.quantize(256, kmeans=1, dither=Image.Dither.NONE).save(

@@ -52,6 +52,18 @@ def test_help_teaches(name: str) -> None:
     assert f"forest {name}" in out.split("Usage", 1)[1].split("\n", 1)[1] or name == "version"
 
 
+def test_the_package_is_the_command(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "forest", "version"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.stdout == forest("version")[1]
+
+
 def test_no_command_is_help() -> None:
     assert forest() == forest("--help")
     assert all(name in forest()[1] for name in COMMANDS)

@@ -12,6 +12,8 @@ from forest.cli.shared import check_targets, endings, given_options
 from forest.cli.surfacing import MESH, check_metres, check_sample, working
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from forest.record.wood import YearlyWood
     from forest.surface.bark.presets import Preset
     from forest.surface.bark.tree_bark import TreeBark
@@ -65,6 +67,12 @@ def bark(
     tile: Annotated[
         bool, typer.Option("--tile", help="A tile of the trunk's bark that repeats, as maps.")
     ] = False,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="GIRTHS.csv", help="Measured girths drive the cracks: columns year, girth_cm."
+        ),
+    ] = None,
     shrink: Annotated[
         bool, typer.Option("--shrink", help="Shrink the bark of the finished tree instead.")
     ] = False,
@@ -97,8 +105,11 @@ def bark(
         forest bark run.h5 --tree 12 --kind tubes --to tree.glb
 
         forest bark --parametric quaking_aspen --to aspen.glb
+
+        forest bark --parametric quaking_aspen --history girths.csv --to aspen.png
     """
     from forest.errors import InputError, nearest
+    from forest.surface.bark.measured import read_girths
     from forest.surface.bark.presets import Preset, preset_names
     from forest.surface.bark.tree_bark import LAWS
     from forest.surface.bark.usual import usual_preset
@@ -125,8 +136,13 @@ def bark(
         idle = [option for option in given if option not in fitting]
         if asked and idle:
             raise InputError(f"{idle[0]} does not go with {what}", expected="one of the two")
+    if shrink and history is not None:
+        raise InputError("--history does not go with --shrink", expected="one of the two")
+    girths = None if history is None else read_girths(history)
     chosen = _tree(run_file, tree, parametric, year, seed)
-    choices.check_years(None if shrink else chosen.wood)
+    wood = None if shrink or girths is not None else chosen.wood
+    years = None if wood is None else wood.years
+    choices.check_years(years if girths is None else girths[0])
     if model == "flow":
         _write_flow(chosen, preset, year, seed, choices)
         return
@@ -135,24 +151,31 @@ def bark(
     if tile:
         _write_tile(chosen.skeleton, kept, seed, choices)
         return
+    from forest.surface.bark.axes import lay_strips
+    from forest.surface.bark.girth import measured_girths
     from forest.surface.bark.tree_bark import bark_tree
 
     with working(f"{kept.name} bark on {chosen.name}"):
+        measured, round_foot = None, kind == "tubes" and to.suffix.lower() in MESH
+        if girths is not None:
+            strips = lay_strips(chosen.skeleton, kept.tearing.strip_m, least_radius_m=least_radius)
+            measured, round_foot = measured_girths(strips, *girths), True
         grown = bark_tree(
             chosen.skeleton,
             kept,
             seed,
-            wood=None if shrink else chosen.wood,
+            wood=wood,
+            history=measured,
             shrink=shrink,
             law=law,
-            flare=None if kind == "tubes" and to.suffix.lower() in MESH else chosen.flare,
+            flare=None if round_foot else chosen.flare,
             least_radius_m=least_radius,
         )
     written = _write(grown, chosen.skeleton, choices)
-    strips, cracks = len(grown.bark.strips.axis), len(grown.bark.fractures.origin)
+    rings, cracks = len(grown.bark.strips.axis), len(grown.bark.fractures.origin)
     typer.echo(
         f"{written}: {kept.name} bark of {chosen.name}, {len(grown.axes)} axes, "
-        f"{strips:,} strips, {cracks:,} cracks"
+        f"{rings:,} strips, {cracks:,} cracks"
     )
 
 
@@ -235,15 +258,17 @@ class _Choices:
         elif self.to.exists() and not self.to.is_dir():
             raise OutputError("is a file", where=str(self.to), expected="a folder")
 
-    def check_years(self, wood: YearlyWood | None) -> None:
+    def check_years(self, known: NDArray[Any] | None) -> None:
         """Refuse a film of years in which the tree was not, before bark is grown."""
         from forest.errors import InputError, span_of
 
         if self.film is None:
             return
-        if wood is None:
-            raise InputError("--film needs a tree with a history", expected="a run's, no --shrink")
-        first, last = int(wood.years[0]), int(wood.years[-1])
+        if known is None:
+            raise InputError(
+                "--film needs a tree with a history", expected="a run's, or --history; no --shrink"
+            )
+        first, last = int(known[0]), int(known[-1])
         for year in self.years:
             if not first <= year <= last:
                 raise InputError(f"no year {year:g}", where="--film", expected=span_of(first, last))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 #: Formats of meshes that commands write.
 MESH = (".glb", ".obj", ".ply", ".vtp")
 _KINDS = ("blended", "tubes")
+#: Tubes may be off by this, m.
+_COARSEST_M = 1.0
 
 
 def mesh(
@@ -105,7 +108,7 @@ def mesh(
     check_metres("--cell", cell)
     if tolerance is not None and kind != "tubes":
         raise InputError("only tubes have a tolerance", where="--tolerance", expected="--cell")
-    check_metres("--tolerance", tolerance, least_too=True)
+    check_metres("--tolerance", tolerance, least_too=True, most=_COARSEST_M)
     if colour is not None:
         check_colour(to, colour)
     with open_run(run_file) as run:
@@ -129,16 +132,18 @@ def mesh(
     typer.echo(f"{to}: {triangles:,} triangles, tree {tree} in {at}, {wood.volume:.4g} m3 of wood")
 
 
-def check_metres(option: str, value: float | None, *, least_too: bool = False) -> None:
+def check_metres(
+    option: str, value: float | None, *, least_too: bool = False, most: float = math.inf
+) -> None:
     """Refuse what is no length above 0, or of 0 or more; None was not said."""
-    from math import isfinite
-
     from forest.errors import InputError
 
     if value is not None and not (
-        isfinite(value) and (value > 0.0 or (least_too and value == 0.0))
+        math.isfinite(value) and (value > 0.0 or (least_too and value == 0.0)) and value <= most
     ):
         expected = "metres, 0 or more" if least_too else "metres, above 0"
+        if math.isfinite(most):
+            expected += f", at most {most:g}"
         raise InputError(f"{option} is {value:g}", expected=expected)
 
 

@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from forest.yearbook import YearRecord
 
 
-#: How a session's file begins in which no year is grown: its `years` are one at least.
-NOT_YET = "# No year of this session is grown yet.\n"
+#: How a session's file begins, so that no other file is taken for one.
+HEADING = "# A live session as a scenario: `forest run` grows it again.\n"
+#: What follows where no year is grown yet: its `years` are one at least.
+NOT_YET = "# No year of it is grown yet.\n"
 
 
 class LiveSession:
@@ -252,7 +254,7 @@ class LiveSession:
         OutputError
             If it cannot be written; what was there before stays.
         """
-        heading = "" if self._records else NOT_YET
+        heading = HEADING if self._records else HEADING + NOT_YET
         with (
             whole_file(path, overwrite=True) as draft,
             draft.open("w", encoding="utf-8") as file,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from forest.errors import InputError
-from forest.live.session import NOT_YET, LiveSession
+from forest.live.session import HEADING, NOT_YET, LiveSession
 from forest.scenario import Scenario
 from forest.scenario.timing import Timing
 
@@ -42,9 +42,12 @@ def take_up(
     session = LiveSession(scenario, say=say)
     if file.exists():
         kept = Scenario.load(file)
-        done = kept.years
-        if file.read_text(encoding="utf-8").startswith(NOT_YET):
-            done = 0
+        text = file.read_text(encoding="utf-8")
+        if not text.startswith(HEADING):
+            raise InputError(
+                "exists already and is no live session", where=str(file), expected="another file"
+            )
+        done = 0 if text.startswith(HEADING + NOT_YET) else kept.years
         _replay(session, scenario, kept, done, str(file), say)
     session.keep_in(file)
     return session

@@ -132,6 +132,11 @@ def check_folder(folder: Path, *, where: Path) -> None:
         raise OutputError.of(error, where) from error
 
 
+def draft_prefix(to: Path) -> str:
+    """Begin the name of a draft: hidden, and so short that a long name of a file leaves room."""
+    return f".{to.name[:40]}."
+
+
 def _holds_blocks(folder: Path) -> bool:
     return folder.is_dir() and all(path.suffix == ".vtp" for path in folder.iterdir())
 
@@ -153,7 +158,7 @@ def whole_file(to: str | Path, *, overwrite: bool) -> Iterator[Path]:
     check_target(to, overwrite=overwrite)
     try:
         # A folder of its own: the draft keeps the suffix, and the rights are the usual ones.
-        with tempfile.TemporaryDirectory(prefix=f".{to.name}.", dir=to.parent) as folder:
+        with tempfile.TemporaryDirectory(prefix=draft_prefix(to), dir=to.parent) as folder:
             draft = Path(folder) / to.name
             yield draft
             beside = [path for path in sorted(draft.parent.iterdir()) if path != draft]
@@ -183,7 +188,7 @@ def whole_folder(to: Path) -> Iterator[Path]:
     """
     check_folder(to.parent, where=to)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{to.name}.", dir=to.parent) as folder:
+        with tempfile.TemporaryDirectory(prefix=draft_prefix(to), dir=to.parent) as folder:
             yield Path(folder)
             for path in sorted(Path(folder).rglob("*")):
                 place = to / path.relative_to(folder)

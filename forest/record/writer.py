@@ -32,6 +32,8 @@ from forest.record.schema import (
 
 Tables = Mapping[str, Mapping[str, NDArray[Any]]]
 
+#: Bytes of a run's name; file systems take 255, and those of its checkpoints are longer.
+_LONGEST_NAME = 220
 _SMALL_CHUNK = 256
 _LARGEST_CHUNK = 1 << 16
 # Files of this format open in every HDF5 since 1.8, and again after a process was killed: newer
@@ -358,8 +360,15 @@ def check_target(path: Path, *, overwrite: bool) -> None:
     Raises
     ------
     InputError, OutputError
-        If it exists and may not be replaced, is a folder, or lies in none.
+        If it exists and may not be replaced, is a folder, or lies in none, or its name is so long
+        that checkpoints beside it have no name.
     """
+    if len(os.fsencode(path.name)) > _LONGEST_NAME:
+        raise InputError(
+            f"a name of {len(os.fsencode(path.name))} bytes",
+            where=str(path),
+            expected=f"at most {_LONGEST_NAME}, which leaves room for its checkpoints' names",
+        )
     if path.exists() and not path.is_file():
         raise InputError("is not a file", where=str(path), expected="the path of a file")
     if path.exists() and not overwrite:

@@ -25,6 +25,8 @@ LAST_LEVEL = 2
 
 SEASONS = ("spring", "summer", "fall", "winter")
 
+_FINEST = 10.0  # quality
+
 _Array = NDArray[np.float64]
 
 
@@ -37,7 +39,7 @@ class Sight:
     season : str
         One of `SEASONS`. Without leaves, or with young ones, branches are seen from farther off.
     quality : float
-        Above 0, usually up to 1: how far branches are drawn.
+        Above 0, at most 10, usually up to 1: how far branches are drawn.
     image_height : float
         Height of the picture, pixels.
     field_of_view_deg : float
@@ -58,8 +60,11 @@ class Sight:
         """Check the user's words."""
         if self.season not in SEASONS:
             raise InputError(f"unknown season {self.season!r}, {nearest(self.season, SEASONS)}")
+        if not 0.0 < self.quality <= _FINEST:
+            raise InputError(
+                f"quality is {self.quality:g}", expected=f"above 0 and at most {_FINEST:g}"
+            )
         for name, least, most in (
-            ("quality", 0.0, np.inf),
             ("image_height", 0.0, np.inf),
             ("field_of_view_deg", 0.0, 180.0),
         ):

@@ -28,6 +28,9 @@ from forest.trees.skeleton import Skeleton
 #: Ranges that have names, m: a tree before one, a stand as one sees it from its edge, a forest.
 DETAILS = {"tree": 20.0, "stand": 100.0, "far": 400.0}
 
+#: Ranges from which a scene may be seen, m.
+NEAREST_M, FARTHEST_M = 0.1, 100_000.0
+
 _TOLERANCE = 1e-4  # of the surface of wood, over the range; about a tenth of a pixel
 _MOST_SIDES = 24
 _SHAPES_A_LINE = 50  # of progress
@@ -142,7 +145,7 @@ def scene_range(detail: str | float) -> float:
     Raises
     ------
     InputError
-        If the name is unknown, or the number not 0 or more.
+        If the name is unknown, or the number not within `NEAREST_M` to `FARTHEST_M`.
     """
     if isinstance(detail, str) and detail in DETAILS:
         return DETAILS[detail]
@@ -151,8 +154,10 @@ def scene_range(detail: str | float) -> float:
     except ValueError:
         hint = f"{nearest(str(detail), tuple(DETAILS))}, or a range in m"
         raise InputError(f"unknown detail {detail!r}, {hint}") from None
-    if not 0.0 <= range_m < np.inf:
-        raise InputError(f"detail is {range_m:g}", expected="a range of 0 m or more")
+    if not NEAREST_M <= range_m <= FARTHEST_M:
+        raise InputError(
+            f"detail is {range_m:g}", expected=f"a range of {NEAREST_M:g} to {FARTHEST_M:,.0f} m"
+        )
     return range_m
 
 

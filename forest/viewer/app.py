@@ -214,14 +214,14 @@ class App:
 
     # ------------------------------------------------------------------ what the page does
 
-    def _fault(self, *what: Any, **_: Any) -> None:
+    def fault(self, *what: Any, **_: Any) -> None:
         """Say that the viewer itself went wrong: trame keeps such faults to itself."""
         said = " ".join(str(part) for part in what)
         if "closing transport" not in said:  # a page was closed while a picture was on its way
             print(f"forest view: fault: {said}", file=sys.stderr, flush=True)
 
     def _listen(self) -> None:
-        self.server.controller.on_exception.add(self._fault)
+        self.server.controller.on_exception.add(self.fault)
         state, trigger = self.state, self.server.controller.trigger
         state.change("step")(lambda **_: self.soon(self.show_year))
         state.change("branches")(lambda **_: self.soon(self.show_year))

@@ -152,7 +152,9 @@ class BendTool(BranchTool):
             self.state.tool_hint = str(error)
             return
         self.state.tool_hint = self.hint
-        draw_segments(self.app.stage, "lit", shape.start, shape.end, _LIT, 3)
+        before = self.desk.source.skeleton(tree_id, self.desk.source.now)
+        moved = np.any(shape.end != before.end, axis=1)
+        draw_segments(self.app.stage, "lit", shape.start[moved], shape.end[moved], _LIT, 4)
         self.app.push()
 
     def put_down(self) -> None:

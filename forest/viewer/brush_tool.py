@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from forest.errors import InputError
 from forest.view.working_plane import WorkingPlane
@@ -22,7 +23,11 @@ _NO_PEN = 0.5  # what browsers say of a mouse's button
 
 
 class BrushTool(BranchTool):
-    """Strokes by drag, in the plane through the metamer or the place where they begin."""
+    """Strokes by drag, in a plane parallel to the screen: through the metamer where they begin.
+
+    A stroke that begins at none lies in the plane of the chosen tree's foot, or else of the ground
+    where it begins.
+    """
 
     name = "brush"
     label = "Brush"
@@ -50,6 +55,7 @@ class BrushTool(BranchTool):
                 "brush_shift_x": 2,
                 "brush_shift_y": 0,
                 "brush_copies": 3,
+                "brush_strokes": [],
             }
         )
         self._plane: WorkingPlane | None = None
@@ -97,18 +103,28 @@ class BrushTool(BranchTool):
                 "no bud perceives markers", expected="a scenario with a table environment.markers"
             )
         looks = self.app.stage.looks
-        if start.tree_id is None:
-            if start.point_m is None:
-                return
-            self._plane = WorkingPlane(start.point_m, looks)
-            self._from, self._centre = None, start.point_m
-            return
         met = self.met(start)
-        if met is None:
-            return
-        shape, serial = met
-        self._plane = WorkingPlane.at(shape, serial, looks)
-        self._from, self._centre = (shape.tree_id, serial), shape.start[0]
+        if met is not None:
+            shape, serial = met
+            self._plane = WorkingPlane.at(shape, serial, looks)
+            self._from, self._centre = (shape.tree_id, serial), shape.start[0]
+        elif start.tree_id is None:
+            self._centre = self._foot(start)
+            self._plane, self._from = WorkingPlane(self._centre, looks), None
+
+    def _foot(self, start: Hit) -> NDArray[np.float64]:
+        """Where the plane of a stroke lies that begins at no branch.
+
+        The foot of the chosen tree; else the ground under the pointer, or the middle of the plot.
+        """
+        trees = self.desk.source.living
+        chosen = trees[trees["tree_id"].to_numpy() == self.app.chosen]
+        if len(chosen):
+            return np.array([float(chosen["x_m"].iloc[0]), float(chosen["y_m"].iloc[0]), 0.0])
+        if start.point_m is not None:
+            return start.point_m
+        width, depth = self.desk.source.scenario.plot.size_m
+        return np.array([0.5 * width, 0.5 * depth, 0.0])
 
     def _stroke(self) -> dict[str, Any]:
         """Give the act of the stroke that was drawn."""
@@ -185,3 +201,13 @@ class BrushTool(BranchTool):
             number_field(v, "brush_shift_x", "Shift along x, m", step=0.5)
             number_field(v, "brush_shift_y", "Shift along y, m", step=0.5)
             number_field(v, "brush_copies", "Copies", min=1)
+        with html.Div(v_for="each in brush_strokes", key="each", classes="quiet"):
+            html.Span("{{ each }}")
+
+    def refresh(self) -> None:
+        """Say how much of each stroke is colonised."""
+        said = []
+        for row in self.desk.source.strokes.itertuples():
+            taken = "" if row.colonised < 0 else f", {row.colonised} colonised"
+            said.append(f"Stroke {row.stroke} of {row.year}: {row.laid} markers{taken}")
+        self.state.brush_strokes = said

@@ -67,7 +67,7 @@ class Desk:
         InputError
             If it is done now and cannot be; then nothing has changed.
         """
-        if self.source.lock.locked():
+        if self.source.growing:
             self._waiting.append(work)
             self.app.state.live_waiting = len(self._waiting)
             return
@@ -82,6 +82,10 @@ class Desk:
                 f"{self.app.year} is past", expected=f"the stand as it is now, of {self.source.now}"
             )
         self.do(lambda session: session.act(**keys))
+
+    def undo(self, number: int) -> None:
+        """Take back an act that waits, by its place among them; raises as `do` does."""
+        self.do(lambda session: session.undo(number))
 
     def finish(self) -> None:
         """Do what still waits, when the page is closed for good."""
@@ -99,6 +103,7 @@ class Desk:
         """Grow a year."""
         if self._grower is None or self._grower.done():
             self._grower = asyncio.get_running_loop().create_task(self._grow())
+            self._grower.add_done_callback(self._ended)
 
     def run(self) -> None:
         """Grow year after year."""
@@ -109,11 +114,18 @@ class Desk:
         """Stop at the end of the year that grows."""
         self.app.state.live_running = False
 
+    def _ended(self, grower: asyncio.Task[None]) -> None:
+        """Say what went wrong, if something did that is no user's error."""
+        self.source.growing = False
+        if not grower.cancelled() and grower.exception() is not None:
+            self.app.fault(repr(grower.exception()))
+
     async def _grow(self) -> None:
         state = self.app.state
         while True:
             with state:
                 state.live_growing, state.live_share = True, 0
+            self.source.growing = True
             began = time.monotonic()
             growing = asyncio.get_running_loop().run_in_executor(None, self._grow_year)
             while not (await asyncio.wait((growing,), timeout=_SHOWN_EVERY_S))[0]:
@@ -127,7 +139,7 @@ class Desk:
                 except InputError as error:
                     state.live_running = False
                     self.app.warn(str(error))
-                state.live_growing = False
+                self.source.growing = state.live_growing = False
                 self._catch_up()
                 self._show(follow=self.app.year == self.source.now)
                 if not state.live_running:

@@ -12,6 +12,8 @@ from forest.viewer.stage import Stage
 
 Points = NDArray[np.float64]
 
+_RING_M = 0.07  # least width of a ring
+
 _PLAIN: dict[str, Any] = {
     "lighting": False,
     "reset_camera": False,
@@ -63,29 +65,32 @@ def draw_brush(stage: Stage, name: str, path: Points, radius: Points, colour: st
     stage.put(name, add)
 
 
-def draw_boxes(stage: Stage, name: str, boxes: list[tuple[Points, Points, str]]) -> None:
-    """Draw boxes, given by their lower and upper corner, m, and their colour."""
-    pv = import_pyvista()
+def draw_surfaces(stage: Stage, name: str, surfaces: list[Any], colour: str) -> None:
+    """Draw pyvista meshes, half transparent, with their sharp edges."""
 
     def add(plotter: Any) -> None:
-        for low, high, colour in boxes:
-            bounds = [float(x) for pair in zip(low, high, strict=True) for x in pair]
-            box = pv.Box(bounds)
-            plotter.add_mesh(box, color=colour, opacity=0.55, **_PLAIN)
-            edges = box.extract_all_edges()
-            plotter.add_mesh(edges, color=colour, line_width=2, **_PLAIN)
+        for surface in surfaces:
+            plotter.add_mesh(surface, color=colour, opacity=0.55, **_PLAIN)
+            edges = surface.extract_feature_edges(30.0)
+            if edges.n_points:
+                plotter.add_mesh(edges, color=colour, line_width=2, **_PLAIN)
 
-    stage.put(name, add if boxes else None)
+    stage.put(name, add if surfaces else None)
 
 
 def draw_rings(stage: Stage, name: str, rings: list[tuple[float, float, float, str]]) -> None:
-    """Draw rings on the ground: x, y, radius, m, and the colour of each."""
+    """Draw rings on the ground: x, y, outer radius (0.1 or more), m, and the colour of each."""
     pv = import_pyvista()
 
     def add(plotter: Any) -> None:
         for colour in sorted({ring[3] for ring in rings}):
             parts = [
-                pv.Disc(center=(x, y, 0.03), inner=0.72 * size, outer=size, c_res=24)
+                pv.Disc(
+                    center=(x, y, 0.03),
+                    inner=size - max(_RING_M, 0.06 * size),
+                    outer=size,
+                    c_res=32,
+                )
                 for x, y, size, own in rings
                 if own == colour
             ]

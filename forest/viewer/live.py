@@ -48,6 +48,7 @@ class LivePart:
         def come_near(**_: object) -> None:
             if app.chosen is None or not self.desk.source.come_near(app.chosen):
                 return
+            app.state.branches_known = True
             if app.state.branches:
                 app.soon(app.show_year)
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import pandas as pd
+    from numpy.typing import NDArray
 
     from forest.dendro.disc import Disc
     from forest.live import LiveSession
@@ -45,7 +46,9 @@ class LiveSource:
     session : LiveSession
         To be touched only with `lock` held.
     lock : threading.Lock
-        Held while a year grows.
+        Held while a year grows, and while something is read of the session.
+    growing : bool
+        Whether a year grows.
 
     Raises
     ------
@@ -55,7 +58,7 @@ class LiveSource:
 
     def __init__(self, session: LiveSession, where: str) -> None:
         self.session, self.where = session, where
-        self.lock = Lock()
+        self.lock, self.growing = Lock(), False
         self.title = session.scenario.title or Path(where).name
         self._near: list[int] = []
         self._first_year = session.scenario.start_year - 1
@@ -78,6 +81,8 @@ class LiveSource:
         self.pending = self.session.pending
         self.obstacles = self.session.obstacles
         self.markers_to_come = self.session.markers_to_come
+        self.markers_laid = self._free_markers()
+        self.strokes = self.session.stand.strokes
         self._metamers = dict(
             zip(
                 self.living["tree_id"].astype(int),
@@ -87,6 +92,14 @@ class LiveSource:
         )
         self._skeletons: dict[int, Skeleton] = {}
         self._recorded: tempfile.TemporaryDirectory[str] | None = None
+
+    def _free_markers(self) -> NDArray[np.float64]:
+        """Places of the markers of strokes that are there and not taken for good."""
+        stand = self.session.stand
+        if stand.surroundings.markers is None:
+            return np.zeros((0, 3))
+        laid = stand.surroundings.markers.laid
+        return laid.point[(laid.due <= stand.steps) & ~laid.gone]
 
     def _trees_at_first(self) -> pd.DataFrame:
         """The stand before its first year, with what is not known then."""
@@ -127,7 +140,7 @@ class LiveSource:
         """All living trees where they are few, and else those looked at last; now alone."""
         if year != self.now:
             return ()
-        if self.lock.locked():
+        if self.growing:
             return tuple(self._skeletons)
         if sum(self._metamers.values()) <= _MOST_METAMERS:
             return tuple(self._metamers)
@@ -159,12 +172,10 @@ class LiveSource:
         InputError
             If one does.
         """
-        if not self.lock.acquire(blocking=False):
-            raise InputError("a year is growing; this waits for its end")
-        try:
+        if self.growing:
+            raise InputError("a year is growing", expected="its end before this")
+        with self.lock:
             yield self.session
-        finally:
-            self.lock.release()
 
     def disc(self, tree_id: int, height_m: float, year: int) -> Disc:
         """A disc, cut as out of the session's run file."""

@@ -57,7 +57,7 @@ class LiveTool:
         """Queue an act, or take it back if it waits."""
         for number, act in enumerate(self.desk.source.pending):
             if all(act.get(key) == value for key, value in keys.items()):
-                self.desk.do(lambda session, number=number: session.undo(number))
+                self.desk.undo(number)
                 return
         self.desk.act(**keys)
 
@@ -75,28 +75,29 @@ class FellTool(LiveTool):
         self.state.update(
             {"fell_ids": "", "fell_rule": "below", "fell_to": "n_ha", "fell_value": 0}
         )
-        self.app.server.controller.trigger("fell_list")(lambda: self.app.tried(self._by_list))
-        self.app.server.controller.trigger("fell_rule")(lambda: self.app.tried(self._by_rule))
+        trigger = self.app.server.controller.trigger
+        trigger("fell_list")(lambda ids: self.app.tried(lambda: self._by_list(str(ids))))
+        trigger("fell_rule")(lambda *rule: self.app.tried(lambda: self._by_rule(*rule)))
 
     def click(self, hit: Hit) -> None:
         """Fell the tree, or let it stand after all."""
         if hit.tree_id is not None:
             self._toggle({"kind": "fell", "tree_ids": [hit.tree_id]})
 
-    def _by_list(self) -> None:
-        words = re.split(r"[\s,;]+", str(self.state.fell_ids).strip())
+    def _by_list(self, ids: str) -> None:
+        words = re.split(r"[\s,;]+", ids.strip())
         wrong = [word for word in words if not word.isdigit()]
         if wrong:
             raise InputError(f"{wrong[0]!r} is no tree's number"[:200], expected="as 3, 14, 15")
         self.desk.act(kind="fell", tree_ids=[int(word) for word in words])
         self.state.fell_ids = ""
 
-    def _by_rule(self) -> None:
-        rule, value = self.state.fell_rule, as_number(self.state.fell_value, "the number")
+    def _by_rule(self, rule: str, to: str, number: Any) -> None:
+        value = as_number(number, "the number")
         if rule == "diameter_limit":
             self.desk.act(kind="harvest", method=rule, limit_cm=value)
         else:
-            self.desk.act(kind="thin", method=rule, **{str(self.state.fell_to): value})
+            self.desk.act(kind="thin", method=rule, **{to: value})
 
     def build(self, v: Any, html: Any) -> None:
         """Make fields for a list and for a rule."""
@@ -110,7 +111,7 @@ class FellTool(LiveTool):
                 hide_details=True,
                 id="fell-ids",
             )
-            v.VBtn("Fell", variant="text", click="trigger('fell_list')", id="fell-list")
+            v.VBtn("Fell", variant="text", click="trigger('fell_list', [fell_ids])", id="fell-list")
         html.H3("Fell by rule")
         rules = [
             {"title": "Thin from below", "value": "below"},
@@ -126,7 +127,12 @@ class FellTool(LiveTool):
         with html.Div(v_if=("fell_rule !== 'diameter_limit'",)):
             choice_field(v, "fell_to", "Down", ("fell_goals", goals))
         number_field(v, "fell_value", "N, G or dbh in cm", min=0)
-        v.VBtn("Fell", variant="text", click="trigger('fell_rule')", id="fell-rule-go")
+        v.VBtn(
+            "Fell",
+            variant="text",
+            click="trigger('fell_rule', [fell_rule, fell_to, fell_value])",
+            id="fell-rule-go",
+        )
 
 
 class MarkTool(LiveTool):

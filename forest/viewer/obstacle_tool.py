@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from forest.scenario.model import Box
 from forest.scenario.shaping import ChangeObstacle
 from forest.viewer.desk import Desk
 from forest.viewer.live_tools import LiveTool
+from forest.viewer.pending import surface_of
 from forest.viewer.picking import Hit, Ray
 from forest.viewer.tool_options import as_number, number_field
 
@@ -86,16 +86,14 @@ class ObstacleTool(LiveTool):
             self.desk.draw({self._moved: self._by})
             self.app.push()
 
-    def _boxes(self) -> list[Box]:
-        return [each for each in self.desk.source.obstacles if isinstance(each, Box)]
-
     def _under(self, ray: Ray) -> str | None:
-        """Name the first box with a name that a ray meets."""
+        """Name the first obstacle with a name whose bounding box a ray meets."""
         found = []
-        for box in self._boxes():
-            way = enters_box(ray, np.array(box.min_m), np.array(box.max_m))
-            if way is not None and box.name:
-                found.append((way, box.name))
+        for each in self.desk.source.obstacles:
+            low, high = np.array(surface_of(each).bounds).reshape(3, 2).T
+            way = enters_box(ray, low, high)
+            if way is not None and each.name:
+                found.append((way, each.name))
         return min(found)[1] if found else None
 
     def _new_name(self) -> str:

@@ -6,8 +6,9 @@ turning the view changes nothing but the camera.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import product
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,9 +54,12 @@ class Stage:
     ----------
     crowns : bool
         Whether crowns are shown.
+    tints : mapping of int to (red, green, blue)
+        Trees that have another colour than theirs, 0 to 1, when they are next shown.
     """
 
     crowns = True
+    tints: Mapping[int, tuple[float, float, float]] = MappingProxyType({})
 
     def __init__(self, size_m: tuple[float, float], conifers: Collection[str]) -> None:
         pv = import_pyvista()
@@ -184,6 +188,8 @@ class Stage:
         barks = {name: look_of(name).bark for name in set(self._species)}
         bark = np.array([barks[name] for name in self._species]).reshape(-1, 3)
         crown = self._colours.copy()
+        for tree_id, tint in self.tints.items():
+            crown[self._ids == tree_id] = tint
         if self._chosen is not None:
             here = self._ids == self._chosen
             crown[here] = _CHOSEN

@@ -37,7 +37,11 @@ def words_of(act: dict[str, Any]) -> str:
     if kind == "stroke":
         only = f", metamer {act['metamer']} alone grows" if act.get("metamer") is not None else ""
         return f"stroke of {len(act['points_m'])} points{only}"
-    rule = (f"{key} {value}" for key, value in act.items() if key not in ("kind", "method"))
+    rule = (
+        f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}"
+        for key, value in act.items()
+        if key not in ("kind", "method")
+    )
     return f"{kind} {act.get('method', '')}, {', '.join(rule)}".replace(" ,", ",")
 
 
@@ -78,7 +82,9 @@ class WorkPanel:
 
         self._build_years(v, html)
         for options in self._options:
-            with html.Div(v_if=(f"tool === '{options.tool}'",), id=f"options-{options.tool}"):
+            with html.Div(
+                v_if=(f"tool === '{options.tool}'",), classes="mt-3", id=f"options-{options.tool}"
+            ):
                 options.build(v, html)
         self._build_acts(v, html)
         html.H3("Session")
@@ -95,7 +101,9 @@ class WorkPanel:
                 hide_details=True,
                 id="run-file",
             )
-            v.VBtn("Save", variant="text", click="trigger('save_run')", id="save-run")
+            v.VBtn(
+                "Save", variant="text", click="trigger('save_run', [live_run_file])", id="save-run"
+            )
         html.Div("{{ live_saved }}", classes="quiet mt-1", id="saved")
 
     def _build_years(self, v: Any, html: Any) -> None:
@@ -180,17 +188,18 @@ class WorkPanel:
             options.refresh()
 
     def _undo(self, number: int) -> None:
-        def take_back(session: LiveSession) -> None:
-            session.undo(int(number))
+        self._desk.app.tried(lambda: self._desk.undo(int(number)))
 
-        self._desk.app.tried(lambda: self._desk.do(take_back))
-
-    def _save(self) -> None:
+    def _save(self, words: Any) -> None:
         """Write a run file, beside the session's where no folder is named."""
-        name = Path(str(self._desk.app.state.live_run_file).strip() or "session.h5")
+        name = Path(str(words).strip() or "session.h5")
         to = name if name.is_absolute() else self._file.parent / name
 
         def write(session: LiveSession) -> None:
+            if to.suffix != ".h5":
+                raise InputError(
+                    f"{to.name} is no run file's name", expected="one that ends in .h5"
+                )
             if to.exists():
                 raise InputError("exists already", where=str(to), expected="a new name")
             session.write_run(to)

@@ -113,6 +113,8 @@ def test_paths_that_cannot_be_written(tmp_path: Path, overwrite: bool) -> None:
         create(tmp_path, overwrite=overwrite)
     with pytest.raises(OutputError, match="there is no folder"):
         create(tmp_path / "missing" / "run.h5", overwrite=overwrite)
+    with pytest.raises(InputError, match="a name of 230 bytes"):
+        create(tmp_path / f"{'n' * 227}.h5", overwrite=overwrite)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -39,7 +39,8 @@ def test_both_maps_show_the_same_where_they_meet() -> None:
     own = _seen(np.asarray(trunk.material.colour_image), uv[0])
     collar = _seen(np.asarray(branch.material.colour_image), uv[1])
     without = _seen(plain[1], uv[1])
-    assert np.abs(collar - own).mean() < 0.6 * np.abs(without - own).mean()
+    # Most places; fine cracks fall between pixels.
+    assert np.median(np.abs(collar - own)) < 0.4 * np.median(np.abs(without - own))
     # Away from the joint the branch keeps its own bark.
     upper = np.asarray(branch.material.colour_image)[: len(plain[1]) // 4]
     assert np.array_equal(upper, plain[1][: len(plain[1]) // 4])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from forest.surface.bark.bark_mesh import displaced_parts, dressed_parts
 from forest.surface.bark.girth import (
     GROWING,
     linked_girths,
+    measured_girths,
     outlines_of,
     perimeter,
     radial_projection,
@@ -23,6 +25,7 @@ from forest.surface.bark.girth import (
     supposed_girths,
 )
 from forest.surface.bark.material import Material
+from forest.surface.bark.measured import read_girths
 from forest.surface.bark.presets import Preset, preset_names
 from forest.surface.bark.strips import FRACTURE
 from forest.surface.bark.tree_bark import TreeBark, bark_tree
@@ -189,6 +192,55 @@ def test_eccentric_rings_stretch_the_thick_side() -> None:
     east = int(np.mod(np.arctan2(-side[1], side[0]) / (2 * np.pi), 1.0) * GROWING) % GROWING
     first = uneven.dilatation[0, strip]
     assert first[east] > 1.2 * first[(east + GROWING // 2) % GROWING]
+
+
+def test_measured_girths_are_those_at_breast_height() -> None:
+    """Rings are as wide everywhere: elsewhere the tree was thinner by as much."""
+    tree = lay_strips(forked(), STRIP)
+    years, girth = np.array([1990.0, 2000.0, 2010.0]), np.array([0.4, 0.5, 0.8])
+    history = measured_girths(tree, years, girth)
+    assert history.times.tolist() == years.tolist()
+    now = history.girth[-1]
+    trunk = tree.strips_of(0)
+    breast = trunk[np.argmin(np.abs(tree.geometry.along[trunk] - 1.3))]
+    assert history.girth[:, breast] == pytest.approx(now[breast] * girth / 0.8, rel=0.01)
+    for row in history.girth:
+        there = ~np.isnan(row)
+        assert np.ptp((now - row)[there]) < 1e-9
+    grown = bark_tree(forked(), Preset.load("oak"), 1, history=history, strip_m=STRIP)
+    assert widths_of(grown) == pytest.approx(now)
+    for wrong in (
+        (years[::-1], girth),
+        (years, girth[::-1]),
+        (years, 0.0 * girth),
+        (years, years[:2]),
+    ):
+        with pytest.raises(InputError, match="bark: history"):
+            measured_girths(tree, *wrong)
+
+
+def test_girths_are_read_or_refused(tmp_path: Path) -> None:
+    file = tmp_path / "girths.csv"
+    file.write_text("year,plot,girth_cm\n1990,A,40\n2000,A,52.5\n")
+    years, girth = read_girths(file)
+    assert years.tolist() == [1990.0, 2000.0]
+    assert girth == pytest.approx([0.4, 0.525])
+    for text, message in (
+        ("", "is empty; expected columns year, girth_cm"),
+        ("year,girth\n1990,40\n", "line 1 has no column 'girth_cm'"),
+        ("year,girth_cm\n", "holds no row"),
+        ("year,girth_cm\n1990,40\n", "holds one year"),
+        ("year,girth_cm\n1990,40\n1990,41\n", "line 3: year 1990 after 1990"),
+        ("year,girth_cm\n1990,40\n1991,39\n", "line 3: girth_cm 39 after 40"),
+        ("year,girth_cm\n1990,40\n1991,-1\n", "line 3: girth_cm is '-1'"),
+        ("year,girth_cm\n1990.5,40\n1991,41\n", "line 2: year is '1990.5'"),
+        ("year,girth_cm\n1990,nan\n1991,41\n", "line 2: girth_cm is 'nan'"),
+    ):
+        file.write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_girths(file)
+    with pytest.raises(InputError, match=r"no\.csv"):
+        read_girths(tmp_path / "no.csv")
 
 
 def test_roots_bulge() -> None:

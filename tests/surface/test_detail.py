@@ -90,7 +90,8 @@ def test_bare_trees_show_their_branches() -> None:
     ("wrong", "hint"),
     [
         ({"season": "sumer"}, "did you mean 'summer'"),
-        ({"quality": 0.0}, "quality is 0.0; expected above 0"),
+        ({"quality": 0.0}, "quality is 0; expected above 0 and at most 10"),
+        ({"quality": 1e9}, "quality is 1e\\+09"),
         ({"image_height": np.nan}, "image_height"),
         ({"field_of_view_deg": 180.0}, "below 180"),
     ],

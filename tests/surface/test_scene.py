@@ -239,8 +239,8 @@ def test_files_are_replaced_only_when_asked(scene: Scene, tmp_path: Path) -> Non
 def test_bad_words_are_refused(scene: Scene, models: list[Model], tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'stand'"):
         four(models, detail="stnd")
-    with pytest.raises(InputError, match="0 m or more"):
-        four(models, detail=-1.0)
+    with pytest.raises(InputError, match=r"0\.1 to 100,000 m"):
+        four(models, detail=0.0)
     with pytest.raises(InputError, match="no tree"):
         build_scene(models, Instances.of([], [], []))
     with pytest.raises(InputError, match="unknown format"):

@@ -106,6 +106,19 @@ def test_a_parametric_tree_and_a_tile(tmp_path: Path) -> None:
     assert wrap < 3.0 * np.abs(np.diff(colour, axis=1)).mean() + 1.0
 
 
+def test_measured_girths_drive_the_cracks(tmp_path: Path) -> None:
+    girths, to = tmp_path / "girths.csv", tmp_path / "trunk.png"
+    girths.write_text("year,girth_cm\n1990,30\n2005,45\n2020,70\n")
+    words = ("bark", "--parametric", "quaking_aspen", "--least-radius", 0.15, "--history", girths)
+    code, out, err = forest(*words, "--film", "1990,2020", "--to", to)
+    assert code == 0, err
+    assert "aspen bark" in out and to.stat().st_size > 1000
+    code, _, err = forest(*words, "--film", "1980", "--to", to, "--force")
+    assert code == 2 and "a year from 1990 to 2020" in err
+    code, _, err = forest(*words, "--shrink", "--to", to, "--force")
+    assert code == 2 and "--history does not go with --shrink" in err
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -119,7 +132,7 @@ def test_a_parametric_tree_and_a_tile(tmp_path: Path) -> None:
         (("--parametric", "quaking_aspen", "--to", "x.glb", "--kind", "cone"), "unknown kind"),
         (("--parametric", "quaking_aspen", "--to", "x.glb", "--tile"), "a folder"),
         (("--parametric", "quaking_aspen", "--to", "x.png", "--cell", 0.1), "--cell"),
-        (("--parametric", "quaking_aspen", "--to", "x", "--height", -1), "--height -1"),
+        (("--parametric", "quaking_aspen", "--to", "x", "--height", -1), "--height is -1"),
         (("--parametric", "quaking_aspen", "--to", "x", "--year", 3), "for a run"),
         (("--parametric", "quaking_aspen", "--to", "x", "--model", "flow"), "flow with --to"),
     ],

@@ -102,6 +102,10 @@ def test_what_goes_beside_a_file_is_not_replaced(run_file: Path, tmp_path: Path)
         (("mesh", "--tree", "1", "--cell", "1e9", "--to", "a.glb"), "--cell: the thickest"),
         (("mesh", "--tree", "1", "--cell", "1e-9", "--to", "a.glb"), "--cell: "),
         (("mesh", "--tree", "1", "--tolerance", "0.1", "--to", "a.glb"), "only tubes have"),
+        (
+            ("mesh", "--tree", "1", "--kind", "tubes", "--tolerance", "1e9", "--to", "a.glb"),
+            "--tolerance is 1e+09; expected metres, 0 or more, at most 1",
+        ),
         (("mesh", "--tree", "1", "--colour", "order", "--to", "a.glb"), "--colour is for a .png"),
         (("scene", "--season", "autumn", "--to", "a.glb"), "unknown --season 'autumn'"),
         (("scene", "--quality", "-1", "--to", "a.glb"), "--quality is -1"),

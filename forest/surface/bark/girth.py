@@ -22,6 +22,7 @@ _Floats = NDArray[np.float64]
 GROWING = 24
 _FINE = 4
 _OUTLINE = GROWING * _FINE
+_BREAST_HEIGHT_M = 1.3
 _ROUNDEST = 1e-9  # m; outlines that differ less are the same
 
 
@@ -159,10 +160,47 @@ def supposed_girths(tree: BarkedTree, years: int = 40) -> GirthHistory:
     """
     if years < 2:
         raise InputError(f"{years} years", where="bark", expected="2 or more")
-    now = _present_radius(tree)
-    ring = float(now.max()) / years
+    ring = float(_present_radius(tree).max()) / years
     times = np.arange(1.0, years + 1.0)
-    radius = now - ring * (years - times)[:, None]
+    return _of_even_rings(tree, times, ring * (years - times))
+
+
+def measured_girths(tree: BarkedTree, years: _Floats, girth_m: _Floats) -> GirthHistory:
+    """Give the girths of a finished tree whose stem was measured over the years.
+
+    Rings are as wide all over the tree as at breast height, so that thinner wood is younger. The
+    measured girth counts in proportion to the last: then the tree is as it stands now.
+
+    Parameters
+    ----------
+    tree : BarkedTree
+    years : float64 (rows,)
+        Rising; two or more.
+    girth_m : float64 (rows,)
+        Girth at breast height, m, above 0 and never falling.
+
+    Raises
+    ------
+    InputError
+        If they are not so.
+    """
+    years, girth = np.asarray(years, np.float64), np.asarray(girth_m, np.float64)
+    if years.ndim != 1 or years.shape != girth.shape or len(years) < 2:
+        raise _refused(f"{years.shape} years, {girth.shape} girths", "two or more of both")
+    if not np.all(np.diff(years) > 0.0):
+        raise _refused("years that do not rise", "years that do")
+    if not (np.all(np.isfinite(girth)) and girth[0] > 0.0 and np.all(np.diff(girth) >= 0.0)):
+        raise _refused("girths that fall or are none", "metres, above 0")
+    trunk = tree.paths[0]
+    at = float(np.clip(_BREAST_HEIGHT_M, trunk.low, trunk.high))
+    stem = float(trunk.radius_at(np.array([at]))[0])
+    return _of_even_rings(tree, years, stem * (1.0 - girth / girth[-1]))
+
+
+def _of_even_rings(tree: BarkedTree, times: _Floats, to_come: _Floats) -> GirthHistory:
+    """Take off all strips the wood, m of radius, that is still to come at each time."""
+    radius = _present_radius(tree) - to_come[:, None]
+    ring = (to_come[0] - to_come[-1]) / (len(times) - 1)
     radius[radius <= 0.25 * ring] = np.nan  # not made yet
     return GirthHistory(times, 2.0 * np.pi * radius, None)
 

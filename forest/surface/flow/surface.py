@@ -18,8 +18,8 @@ _NEWTON_STEPS = 12
 _HALVINGS = 30
 #: Step of differences for the slope, m.
 _STEP = 1e-6
-#: Greatest slope that a smooth blend has.
-_STEEPEST = 4.0
+#: Least and greatest slope that a smooth blend has.
+_FLATTEST, _STEEPEST = 0.5, 4.0
 
 
 class Surface(Protocol):
@@ -103,13 +103,14 @@ def settle(field: Any, x: Any, y: Any, z: Any, hint: Any, normal: Any) -> Any:
     gx, gy, gz = normal[0], normal[1], normal[2]
     stale = gx * gx + gy * gy + gz * gz < 0.5
     for _ in range(_NEWTON_STEPS):
-        cones = field.cones
-        if abs(f) <= CLOSE * min(cones.low[which], cones.high[which]):
+        close = CLOSE * min(field.cones.low[which], field.cones.high[which])
+        if stale or abs(f) <= close:
+            gx, gy, gz = _slope(field, x, y, z, f, which)
+        square = max(gx * gx + gy * gy + gz * gz, _FLATTEST * _FLATTEST)
+        if abs(f) <= close * min(np.sqrt(square), 1.0):  # a normal's slope is 1, a blend's less
             off = f
             break
-        if stale:
-            gx, gy, gz = _slope(field, x, y, z, f, which)
-        step = f / max(gx * gx + gy * gy + gz * gz, 0.25)
+        step = f / square
         x, y, z = x - step * gx, y - step * gy, z - step * gz
         before = abs(f)
         f, which = value(field, x, y, z, which)
@@ -118,7 +119,7 @@ def settle(field: Any, x: Any, y: Any, z: Any, hint: Any, normal: Any) -> Any:
         x, y, z, off = _along_ray(field, x, y, z, which)
         f, which = value(field, x, y, z, which)
         off = min(abs(f), off)  # where the function jumps, the surface is in the jump
-    gx, gy, gz = _slope(field, x, y, z, f, which)
+        gx, gy, gz = _slope(field, x, y, z, f, which)
     if gx * gx + gy * gy + gz * gz > _STEEPEST * _STEEPEST:
         _, _, fx, fy, fz, _ = cone(field.cones, which, x, y, z)
         gx, gy, gz = x - fx, y - fy, z - fz
