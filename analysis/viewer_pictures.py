@@ -1,7 +1,7 @@
-"""Pictures of `forest view` for its page in the docs: `python analysis/viewer_pictures.py RUN.h5 TREE`.
+"""Pictures of `forest view` for its page: `python analysis/viewer_pictures.py RUN.h5 TREE`.
 
-TREE is a sample tree, thick enough for bark. It starts the viewer as a user does, opens its page in a headless Chromium and saves what is seen in
-docs/gallery.
+TREE is a sample tree, thick enough for bark. The viewer is started as a user does, its page opened
+in a headless Chromium, and what is seen saved in docs/gallery.
 """
 
 from __future__ import annotations
@@ -67,8 +67,13 @@ def tour(page: Any, tree: str) -> None:
     page.click("#alone")
     page.click("#look-tree")
     box = page.locator("#picture").bounding_box()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    for _ in range(5):
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y + 200)
+    page.mouse.down(button="middle")
+    page.mouse.move(x, y, steps=5)
+    page.mouse.move(x, y - 60, steps=5)
+    page.mouse.up(button="middle")
+    for _ in range(14):
         page.mouse.wheel(0, -240)
         page.wait_for_timeout(300)
     shoot(page, "viewer_bark")

@@ -69,8 +69,9 @@ class Stage:
         self.plotter.render_window.SetMultiSamples(0)
         self.plotter.set_background(_SKY[0], top=_SKY[1])
         self.plotter.enable_terrain_style(mouse_wheel_zooms=True)
-        sun = pv.Light(position=tuple(SUN), light_type="scene light")
-        self.plotter.add_light(sun)  # for what has no light baked into it
+        for towards, strength in ((SUN, 0.85), (SUN * (-1.0, -1.0, 0.6), 0.4)):
+            lamp = pv.Light(position=tuple(towards), intensity=strength, light_type="scene light")
+            self.plotter.add_light(lamp)  # for what has no light baked into it
         self._bodies = Bodies(
             np.zeros((0, 3), np.float32),
             np.zeros((0, 3), np.int32),
