@@ -1,7 +1,7 @@
-"""Pictures of `forest view` for its page in the docs: `python analysis/viewer_pictures.py RUN.h5`.
+"""Pictures of `forest view` for its page: `python analysis/viewer_pictures.py RUN.h5 TREE`.
 
-It starts the viewer as a user does, opens its page in a headless Chromium and saves what is seen in
-docs/gallery.
+TREE is a sample tree, thick enough for bark. The viewer is started as a user does, its page opened
+in a headless Chromium, and what is seen saved in docs/gallery.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def shoot(page: Any, name: str, *, still: bool = False) -> None:
     )
 
 
-def tour(page: Any) -> None:
+def tour(page: Any, tree: str) -> None:
     """Go through the views."""
     page.wait_for_selector("#year", timeout=_PATIENCE_MS)
     shoot(page, "viewer_stand")
@@ -54,6 +54,30 @@ def tour(page: Any) -> None:
     page.wait_for_selector("#disc", timeout=_PATIENCE_MS)
     page.locator("#disc").scroll_into_view_if_needed()
     shoot(page, "viewer_tree")
+    page.fill("#find", tree)
+    page.click("#find-button")
+    page.wait_for_function(
+        "id => document.querySelector('#card-title').innerText.includes('Tree ' + id)", arg=tree
+    )
+    page.click("#shape-bark")
+    page.wait_for_function(
+        "document.querySelector('#shape-said').innerText.includes('triangles')",
+        timeout=_PATIENCE_MS,
+    )
+    page.click("#alone")
+    page.click("#look-tree")
+    box = page.locator("#picture").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y + 200)
+    page.mouse.down(button="middle")
+    page.mouse.move(x, y, steps=5)
+    page.mouse.move(x, y - 60, steps=5)
+    page.mouse.up(button="middle")
+    for _ in range(14):
+        page.mouse.wheel(0, -240)
+        page.wait_for_timeout(300)
+    shoot(page, "viewer_bark")
+    page.click("#alone")
     page.click("#year")
     page.keyboard.press("Escape")
     page.click(".v-tab:has-text('Light')")
@@ -63,6 +87,8 @@ def tour(page: Any) -> None:
     shoot(page, "viewer_slice")
     page.click("#inside-sun")
     page.wait_for_selector("#light-view", timeout=_PATIENCE_MS)
+    page.locator("#light-view").click()
+    page.evaluate("document.querySelector('.v-navigation-drawer__content').scrollTop = 0")
     shoot(page, "viewer_light")
 
 
@@ -70,8 +96,8 @@ def main(arguments: Sequence[str]) -> None:
     """Take the pictures of a run."""
     from playwright.sync_api import sync_playwright
 
-    if len(arguments) != 1:
-        sys.exit("usage: python analysis/viewer_pictures.py RUN.h5")
+    if len(arguments) != 2:
+        sys.exit("usage: python analysis/viewer_pictures.py RUN.h5 TREE")
     code = "from forest.cli import main; main()"
     view = subprocess.Popen(
         [sys.executable, "-c", code, "view", arguments[0], "--port", "0", "--no-browser"],
@@ -89,7 +115,7 @@ def main(arguments: Sequence[str]) -> None:
             browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
             page = browser.new_page(viewport={"width": 1280, "height": 780})
             page.goto(found.group())
-            tour(page)
+            tour(page, arguments[1])
             browser.close()
     finally:
         view.terminate()

@@ -333,7 +333,7 @@ def _count_seen(depth, who, tile, span, metamers, trees, scene, entries):  # typ
 
 
 @njit
-def _draw_tiles(first, step, metamers, trees, looks, scene, radius, columns, entries):  # type: ignore[no-untyped-def]
+def _draw_tiles(first, step, metamers, trees, looks, scene, radius, columns, entries, names):  # type: ignore[no-untyped-def]
     depth = np.empty((TILE, TILE), np.float32)
     who = np.empty((TILE, TILE), np.int32)
     tiles_x = (scene.wide + TILE - 1) >> SHIFT
@@ -349,12 +349,21 @@ def _draw_tiles(first, step, metamers, trees, looks, scene, radius, columns, ent
             depth, who, place, span, metamers, trees, looks, scene, radius, columns, entries
         )
         _count_seen(depth, who, place, span, metamers, trees, scene, entries)
+        if len(names) > 0:
+            for j in range(place[2], place[3]):
+                for i in range(place[0], place[1]):
+                    name = who[j - y, i - x]
+                    names[j, i] = np.int32(span[0] + name) if name >= 0 else np.int32(-1)
 
 
 @driver
-def draw(first, step, metamers, trees, looks, scene, radius, columns, entries):  # type: ignore[no-untyped-def]
-    """Draw every tile and count the pixels of every entry."""
-    _draw_tiles(first, step, metamers, trees, looks, scene, radius, columns, entries)
+def draw(first, step, metamers, trees, looks, scene, radius, columns, entries, names):  # type: ignore[no-untyped-def]
+    """Draw every tile and count the pixels of every entry.
+
+    `names`, int32 (deep, wide) or (0, 0) if it is not wanted, gets the entry seen in each pixel of
+    tiles that hold any; -1 where none is.
+    """
+    _draw_tiles(first, step, metamers, trees, looks, scene, radius, columns, entries, names)
 
 
 @njit

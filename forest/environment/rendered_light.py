@@ -10,7 +10,7 @@ over its own metamers, times the common cosine of incidence; its share of the pi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,31 @@ from forest.trees.table import Trees
 
 #: Share of full sun above which photosynthesis does not rise (Horn 1971, Fig. 5.1).
 _SATURATION = 0.2
+
+
+class IndexPicture(NamedTuple):
+    """What the light sees from one place: the index buffer that it is counted from.
+
+    Attributes
+    ----------
+    tree : int32 (deep, wide)
+        Row of the tree that is seen in each pixel, -1 where none is. Lines go along y, pixels of a
+        line along x.
+    item : int32 (deep, wide)
+        Its leaf, by its metamer's number in the tree, or -1 - metamer of an internode.
+    obstacle : bool (deep, wide)
+        Where an obstacle is seen.
+    toward : float64 (3,)
+        Unit vector towards the light.
+    share : float32 (arena,)
+        Part of each node's leaf that is seen, 0 to 1 and, by the pixels' places, at times above.
+    """
+
+    tree: NDArray[np.int32]
+    item: NDArray[np.int32]
+    obstacle: NDArray[np.bool_]
+    toward: NDArray[np.float64]
+    share: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -115,15 +140,36 @@ class RenderedLight:
     def expose(self, metamers: Metamers, trees: Trees, step: int) -> None:
         """Take the year's pictures and set `metamers.light` of every node; 0 without a bud."""
         walk = _walk(trees)
-        if len(self._radius) < len(metamers.parent):
-            self._radius = np.empty(len(metamers.parent), np.float32)
-            self._count = np.zeros(len(metamers.parent), np.int32)
-        in_threads(prepare, metamers, trees, walk, self._looks, self._radius)
+        self._prepare(metamers, trees, walk)
         for picture in range(self._spec.directions):
             toward, shift_x, shift_y = self._path.draw(self._seed, step, picture)
             self.add_picture(metamers, trees, walk, toward, (shift_x, shift_y))
         if self._spec.response == "flat_above_20":
             in_threads(respond, metamers, walk, self._full_light, _SATURATION)
+
+    def picture(self, metamers: Metamers, trees: Trees, step: int, number: int = 0) -> IndexPicture:
+        """Take one of a year's pictures and give what it shows; the stand stays as it is."""
+        walk = _walk(trees)
+        share = np.zeros_like(metamers.light)
+        lit = metamers._replace(light=share)
+        self._prepare(lit, trees, walk)
+        toward, *shift = self._path.draw(self._seed, step, number)
+        scene = self._scene(lit, trees, walk, toward, (shift[0], shift[1]))
+        seen = np.full((max(scene.deep, 0), max(scene.wide, 0)), -1, np.int32)
+        if not seen.size:
+            return IndexPicture(seen, seen, seen >= 0, toward, share)
+        entries = self._draw(lit, trees, walk, scene, seen)
+        self._gather(lit, trees, walk, scene, entries, 1.0)
+        here = seen >= 0
+        tree, item = np.full_like(seen, -1), np.full_like(seen, -1)
+        tree[here], item[here] = entries.tree[seen[here]], entries.item[seen[here]]
+        return IndexPicture(tree, item, here & (tree < 0), toward, share)
+
+    def _prepare(self, metamers: Metamers, trees: Trees, walk: Walk) -> None:
+        if len(self._radius) < len(metamers.parent):
+            self._radius = np.empty(len(metamers.parent), np.float32)
+            self._count = np.zeros(len(metamers.parent), np.int32)
+        in_threads(prepare, metamers, trees, walk, self._looks, self._radius)
 
     def add_picture(
         self,
@@ -137,13 +183,34 @@ class RenderedLight:
         scene = self._scene(metamers, trees, walk, toward, shift)
         if scene.wide <= 0:
             return
-        entries = self._enter(metamers, trees, walk, scene)
-        common = (self._looks, scene)
-        in_threads(draw, metamers, trees, *common, self._radius, self._columns, entries)
+        entries = self._draw(metamers, trees, walk, scene, np.empty((0, 0), np.int32))
         share = self._full_light / self._spec.directions
-        in_threads(
-            gather, metamers, trees, walk, *common, entries, self._count, self._clearing, share
-        )
+        self._gather(metamers, trees, walk, scene, entries, share)
+
+    def _draw(
+        self,
+        metamers: Metamers,
+        trees: Trees,
+        walk: Walk,
+        scene: Scene,
+        names: NDArray[np.int32],
+    ) -> Entries:
+        entries = self._enter(metamers, trees, walk, scene)
+        looks, columns = self._looks, self._columns
+        in_threads(draw, metamers, trees, looks, scene, self._radius, columns, entries, names)
+        return entries
+
+    def _gather(
+        self,
+        metamers: Metamers,
+        trees: Trees,
+        walk: Walk,
+        scene: Scene,
+        entries: Entries,
+        share: float,
+    ) -> None:
+        common = (self._looks, scene, entries, self._count, self._clearing, share)
+        in_threads(gather, metamers, trees, walk, *common)
 
     def _scene(
         self,

@@ -8,7 +8,7 @@ light, unless markers give one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
 from forest.environment.obstacles import Box, Mesh, Solid, solid_places
 from forest.environment.plant_area import PlantArea
 from forest.environment.rendered_kernels import Looks
-from forest.environment.rendered_light import RenderedLight, RenderedSpec
+from forest.environment.rendered_light import IndexPicture, RenderedLight, RenderedSpec
 from forest.environment.standing import Standing
 from forest.trees.buds import Shoots
 from forest.trees.metamers import Metamers
@@ -86,19 +86,18 @@ class Surroundings:
             ),
             latitude_deg=scenario.site.latitude_deg,
         )
-        self._make_rendered: Callable[..., RenderedLight] | None = None
-        if spec.rendered is not None:
-            self._make_rendered = partial(
-                RenderedLight,
-                RenderedSpec(**spec.rendered.model_dump()),
-                size_m=size_m,
-                periodic=periodic,
-                latitude_deg=scenario.site.latitude_deg,
-                seed=scenario.seed,
-                looks=Looks(np.array([s.leaves.area_m2 for s in species]), pipe_exponent),
-                voxel_m=self.voxel_m,
-                full_light=self.full_light,
-            )
+        self._is_rendered = spec.rendered is not None
+        self._make_rendered = partial(
+            RenderedLight,
+            RenderedSpec(**spec.rendered.model_dump()) if spec.rendered else RenderedSpec(),
+            size_m=size_m,
+            periodic=periodic,
+            latitude_deg=scenario.site.latitude_deg,
+            seed=scenario.seed,
+            looks=Looks(np.array([s.leaves.area_m2 for s in species]), pipe_exponent),
+            voxel_m=self.voxel_m,
+            full_light=self.full_light,
+        )
         self.build(scenario.obstacles)
         self._markers: MarkerSpace | None = None
         if spec.markers is not None:
@@ -130,7 +129,7 @@ class Surroundings:
         """
         self._light = self._make_light(obstacles=shapes_of(obstacles))
         self._rendered: RenderedLight | None = None
-        if self._make_rendered is not None:
+        if self._is_rendered:
             self._rendered = self._make_rendered(solid=self._light.solid)
 
     def solid_of(self, obstacles: Sequence[Obstacle]) -> Solid:
@@ -202,6 +201,14 @@ class Surroundings:
         serial = metamers.serial[trees.start[row] + shoots.metamer]
         wanted = _key(trees.tree_id[row], serial, shoots.bud)
         return direction[np.searchsorted(keys, wanted)]
+
+    def picture(self, metamers: Metamers, trees: Trees, step: int, number: int = 0) -> IndexPicture:
+        """Show the stand as the light of a step sees it, with rendered light or without it.
+
+        See `RenderedLight.picture`; where the scenario has no rendered light, with its defaults.
+        """
+        rendered = self._rendered or self._make_rendered(solid=self._light.solid)
+        return rendered.picture(metamers, trees, step, number)
 
     @property
     def markers(self) -> MarkerSpace | None:

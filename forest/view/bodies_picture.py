@@ -31,6 +31,10 @@ _MARGIN = 1.12
 _SUN, _SKY, _FLOOR = 0.62, 0.30, 0.24  # what of its colour a surface shows by each light
 _WITHIN = 0.7  # brightness low in a crown, of that at its top
 
+# Corners of stems, of crowns, rings of crowns: for so many trees at most.
+_DETAIL = ((1200, (8, 12, 5)), (10**9, (3, 9, 4)))
+_SHADOW_DETAIL = (3, 7, 2)
+
 
 class Stage:
     """A plot on which trees are put and seen; one plotter for all pictures of it.
@@ -69,6 +73,7 @@ class Stage:
         self.height_m = max(height_m, _LEAST_HEIGHT_M)
         self._shown = False
         self._plotter = open_plotter(window)
+        self._plotter.render_window.SetMultiSamples(0)  # its pixels are averaged as it is
         self._plotter.set_background(AROUND)
         self._add_ground()
 
@@ -90,10 +95,10 @@ class Stage:
         -------
         uint8 (height, width, 3)
         """
-        bodies = tree_bodies(trees, conifers=self.conifers)
-        self._add_bodies(bodies, trees, colours)
+        detail = next(sides for most, sides in _DETAIL if len(trees) <= most)
+        self._add_bodies(self._bodies(trees, detail), trees, colours)
         if self.view != "above":
-            self._add_shadows(bodies)
+            self._add_shadows(self._bodies(trees, _SHADOW_DETAIL))
         self._look(turn)
         shown, self._shown = self._shown, True
         return shoot(self._plotter, again=shown)
@@ -123,6 +128,16 @@ class Stage:
         corners = np.array([(0, 0), (width, 0), (width, depth), (0, depth), (0, 0)], float)
         outline = pv.lines_from_points(np.column_stack((corners, np.full(5, 0.03))))
         self._plotter.add_mesh(outline, color=(0.25, 0.22, 0.18), line_width=2, lighting=False)
+
+    def _bodies(self, trees: pd.DataFrame, detail: tuple[int, int, int]) -> Bodies:
+        stem, crown, rings = detail
+        return tree_bodies(
+            trees,
+            stem_sides=stem,
+            crown_sides=crown,
+            crown_rings=rings,
+            conifers=self.conifers,
+        )
 
     def _add_bodies(self, bodies: Bodies, trees: pd.DataFrame, colours: TreeColours) -> None:
         self._plotter.remove_actor("bodies", render=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -205,8 +206,10 @@ def shoot(plotter: Any, *, again: bool = False) -> NDArray[np.uint8]:
     """
     if again:
         plotter.render()
-    fine = np.asarray(plotter.screenshot(return_img=True), np.float32)
+    fine = np.asarray(plotter.screenshot(return_img=True))
     k = OVERSAMPLING
-    height, width = fine.shape[0] // k, fine.shape[1] // k
-    mean = fine[: height * k, : width * k, :3].reshape(height, k, width, k, 3).mean(axis=(1, 3))
-    return np.asarray(mean.round().astype(np.uint8))
+    height, width = fine.shape[0] // k * k, fine.shape[1] // k * k
+    total = np.full((height // k, width // k, 3), k * k // 2, np.uint16)  # so as to round
+    for i, j in product(range(k), repeat=2):
+        total += fine[i:height:k, j:width:k, :3]
+    return np.asarray((total // (k * k)).astype(np.uint8))

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from forest.errors import InputError
 from forest.viewer.colours import CHOICES, colour_trees
+from forest.viewer.detail import trees_in_detail
 from forest.viewer.picking import Hit
 from forest.viewer.server import import_trame
 from forest.viewer.source import Source
@@ -76,11 +77,12 @@ class App:
         self._pressed: tuple[float, float, Hit] | None = None
         self._wanted: dict[str, Callable[[], None]] = {}
         self._player: asyncio.Task[None] | None = None
+        self._in_detail: tuple[int, ...] = ()
         self._fresh_state()
         self.add_tool(PickTool(self.choose))
         self.panels: list[Panel] = [make(self) for make in (*panels, *usual_panels)]
         self.show_year()
-        self.stage.look("stand")
+        self.look("stand")
         build_page(self)
         self._listen()
 
@@ -145,7 +147,8 @@ class App:
         state.legend = legend.as_state()
         known = self.source.with_branches(self.year)
         state.branches_known = bool(known)
-        shapes = [self.source.skeleton(tree, self.year) for tree in known] if state.branches else []
+        self._in_detail = trees_in_detail(self)
+        shapes = [self.source.skeleton(tree, self.year) for tree in self._in_detail]
         alone = self.chosen if state.alone else None
         self.stage.show_trees(self.trees, self.colours, shapes, alone=alone)
         self.refresh()
@@ -163,7 +166,7 @@ class App:
         if tree_id is None:
             self.state.alone = False
         self.stage.choose(tree_id)
-        if self.state.alone:
+        if self.state.alone or trees_in_detail(self) != self._in_detail:
             self.show_year()
         if tree_id is not None and card:
             self.state.tab = "tree"
@@ -175,7 +178,13 @@ class App:
             self.stage.look(way)
         elif self.chosen is not None:
             self.stage.look_at_tree(self.chosen)
+        self.come_closer()
         self.push()
+
+    def come_closer(self) -> None:
+        """Show other trees with branches, if the camera has come near them."""
+        if trees_in_detail(self) != self._in_detail:
+            self.show_year()
 
     def refresh(self) -> None:
         """Bring panels and picture up to date."""
@@ -221,6 +230,7 @@ class App:
         state.change("playing")(lambda **_: self._play())
         state.change("tab")(lambda **_: self.soon(self.refresh_panels))
         state.change("tool")(lambda **_: self._take_tool())
+        self.stage.when_moved(lambda: self.soon(self.come_closer))
         trigger("pointer")(self._pointer)
         trigger("wheel")(lambda turns: self.tried(lambda: self._tool.wheel(float(turns))))
         trigger("key")(self._key)

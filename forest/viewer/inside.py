@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forest.environment.marker_places import free_markers
-from forest.environment.sun import LightPath
 from forest.errors import InputError
 from forest.stand import Stand
+from forest.trees.metamers import LATERAL, TERMINAL
+from forest.view.looks import look_of
+
+_Number = TypeVar("_Number", bound=np.generic)
 
 _MOST_MARKERS = 60_000
 _AROUND_M = 3.0  # markers are shown so far around a tree
 _MOST_PIXELS = 900
-_FINEST_M = 0.02
+_FEWEST_PIXELS = 500
 _WOOD = np.array([74, 58, 44], np.uint8)
+_STONE = np.array([120, 122, 128], np.uint8)
 _FLOOR = np.array([236, 232, 220], np.uint8)
 _GOLDEN = 0.6180339887498949
 
@@ -91,100 +95,118 @@ def markers_around(stand: Stand, tree_id: int | None) -> tuple[NDArray[np.float6
 
 
 class LightView(NamedTuple):
-    """The stand as the light sees it.
+    """The stand as the light sees it: lines from north to south, as a map has them.
 
     Attributes
     ----------
     image : uint8 (ny, nx, 3)
-        y upwards in the plot is upwards in the picture.
+    tree_id : int32 (ny, nx)
+        The tree that is seen in each pixel, 0 where none is.
     toward : float64 (3,)
         Direction of the light, a unit vector.
-    seen : float
-        Share of the leaf pixels that is seen: mean light of the leaves.
+    lit : dict of int to int
+        Pixels in which each tree's leaves are seen, of the picture that light is counted from;
+        `image` may have fewer or more.
+    share : float
+        Share of the leaf area that is seen: mean light of the leaves in this picture.
     """
 
     image: NDArray[np.uint8]
+    tree_id: NDArray[np.int32]
     toward: NDArray[np.float64]
-    seen: float
+    lit: dict[int, int]
+    share: float
 
 
-def view_from_light(stand: Stand, picture: int = 0) -> LightView:
-    """Draw the stand from one stochastic place of sun or sky, each tree's leaves in one colour.
+#: What leaves can be coloured by as the light sees them: name, label.
+LIGHT_COLOURS = {"leaf": "Leaf", "tree": "Tree", "species": "Species", "light": "Light it got"}
 
-    Leaves are horizontal squares and the first along the light is seen, as in Hart & Baker (2003,
-    section 4.1) and `forest.environment.rendered_light`; pixels are laid on the ground along the
-    light. Places are those of the scenario's seed in the stand's year.
+
+def view_from_light(stand: Stand, number: int = 0, by: str = "leaf") -> LightView:
+    """Show one of the year's pictures that rendered light is counted from.
+
+    It is the index buffer of Hart & Baker (2003, section 4.1), drawn by
+    `forest.environment.rendered_light`: each leaf a horizontal square in a colour of its own,
+    internodes and obstacles opaque background. Without rendered light in the scenario, it is the
+    picture that its defaults give.
+
+    Parameters
+    ----------
+    stand : Stand
+        An exposed one.
+    number : int
+        Which of the year's places of sun and sky.
+    by : str
+        One of `LIGHT_COLOURS`.
+
+    Raises
+    ------
+    InputError
+        If there is no leaf.
     """
-    from forest.environment.rendered_light import RenderedSpec
-
-    given = stand.scenario.environment.rendered
-    spec = RenderedSpec(**given.model_dump()) if given is not None else RenderedSpec()
-    path = LightPath(stand.scenario.site.latitude_deg, spec.sun_share, spec.lowest_deg)
-    toward, _, _ = path.draw(stand.scenario.seed, stand.steps, picture)
-    slope = toward[:2] / toward[2]
+    metamers, trees = stand.arena.metamers, stand.rows
+    seen = stand.surroundings.picture(metamers, trees, stand.steps, number)
     area = np.array([kind.leaves.area_m2 for kind in stand.species])
-    places, heights, colours, edges = [], [], [], []
-    for row, tree_id in enumerate(stand.rows.tree_id):
-        shape = stand.skeleton(int(tree_id))
-        wood = 0.5 * (shape.start + shape.end)
-        leaf = shape.end[shape.leafy]
-        colour = _leaf_colours(int(tree_id), shape.axis[shape.leafy])
-        edge = np.sqrt(area[stand.rows.species[row]])
-        for points, tone, size in (
-            (wood, np.broadcast_to(_WOOD, wood.shape), np.zeros(len(wood))),
-            (leaf, colour, np.full(len(leaf), edge)),
-        ):
-            places.append(points[:, :2] - points[:, 2:] * slope)
-            heights.append(points[:, 2])
-            colours.append(tone)
-            edges.append(size)
-    if not places:
-        raise InputError("no tree stands that the light could see")
-    where, height = np.concatenate(places), np.concatenate(heights)
-    return _painted(where, height, np.concatenate(colours), np.concatenate(edges), toward)
+    nodes = [np.arange(a, a + n) for a, n in zip(trees.start, trees.size, strict=True)]
+    sites = [_sites(metamers.state[k]) * area[s] for k, s in zip(nodes, trees.species, strict=True)]
+    whole = sum(float(site.sum()) for site in sites)
+    if not seen.tree.size or whole == 0.0:
+        raise InputError("no leaf is there that the light could see")
+    lit = sum(float(site @ seen.share[k]) for site, k in zip(sites, nodes, strict=True))
+    is_leaf = (seen.tree >= 0) & (seen.item >= 0)
+    count = np.bincount(seen.tree[is_leaf], minlength=len(trees.tree_id))
+    step = max(1, -(-max(seen.tree.shape) // _MOST_PIXELS))
+    every = np.s_[::step, ::step]
+    tree, item, obstacle = seen.tree[every], seen.item[every], seen.obstacle[every]
+    tree_id = np.where(tree >= 0, trees.tree_id[tree], 0).astype(np.int32)
+    times = max(1, _FEWEST_PIXELS // max(tree.shape))
+    image = _enlarged(_coloured(stand, tree, item, obstacle, by), times)
+    tree_id = _enlarged(tree_id, times)
+    known = dict(zip(trees.tree_id.tolist(), count.tolist(), strict=True))
+    return LightView(image, tree_id, seen.toward, known, lit / whole)
 
 
-def _leaf_colours(tree_id: int, axis: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Give each limb's leaves a shade of their tree's colour."""
+def _enlarged(part: NDArray[_Number], times: int) -> NDArray[_Number]:
+    """Let each pixel be a square of so many along its edge, and the last line come first."""
+    return part[::-1].repeat(times, axis=0).repeat(times, axis=1)
+
+
+def _sites(state: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Count the leaf-bearing sites of each node."""
+    return ((state & TERMINAL) > 0).astype(np.int64) + ((state & LATERAL) > 0)
+
+
+def _coloured(
+    stand: Stand,
+    tree: NDArray[np.int32],
+    item: NDArray[np.int32],
+    obstacle: NDArray[np.bool_],
+    by: str,
+) -> NDArray[np.uint8]:
+    """Colour what is seen in each pixel."""
+    from matplotlib import colormaps
     from matplotlib.colors import hsv_to_rgb
 
-    hue = np.full(len(axis), (tree_id * _GOLDEN) % 1.0)
-    value = 0.55 + 0.4 * np.modf(axis * _GOLDEN)[0]
-    hsv = np.column_stack((hue, np.full(len(axis), 0.55), value)).reshape(-1, 3)
-    return np.asarray(255.0 * hsv_to_rgb(hsv), np.uint8)
-
-
-def _painted(
-    where: NDArray[np.float64],
-    height: NDArray[np.float64],
-    colour: NDArray[np.uint8],
-    edge: NDArray[np.float64],
-    toward: NDArray[np.float64],
-) -> LightView:
-    """Paint squares (their middle, edge in m) from the lowest to the highest."""
-    low, high = where.min(axis=0) - 0.5, where.max(axis=0) + 0.5
-    pixel = max(float((high - low).max()) / _MOST_PIXELS, _FINEST_M)
-    nx, ny = (int(n) for n in np.ceil((high - low) / pixel).astype(int))
-    half = np.minimum(np.ceil(0.5 * edge / pixel - 0.5).astype(int), 12)
-    item, column, line = [], [], []
-    for size in np.unique(half):
-        here = np.flatnonzero(half == size)
-        at = ((where[here] - low) / pixel).astype(int)
-        for dx in range(-size, size + 1):
-            for dy in range(-size, size + 1):
-                item.append(here)
-                column.append(at[:, 0] + dx)
-                line.append(at[:, 1] + dy)
-    items, x, y = (np.concatenate(part) for part in (item, column, line))
-    drawn = (x >= 0) & (x < nx) & (y >= 0) & (y < ny)
-    items, flat = items[drawn], y[drawn] * nx + x[drawn]
-    order = np.argsort(height[items], kind="stable")
-    owner = np.full(nx * ny, -1, np.int64)
-    np.maximum.at(owner, flat[order], np.arange(len(order)))
-    shown = owner >= 0
-    image = np.empty((nx * ny, 3), np.uint8)
+    rows = stand.rows
+    image = np.empty((*tree.shape, 3), np.uint8)
     image[:] = _FLOOR
-    image[shown] = colour[items[order][owner[shown]]]
-    is_leaf = edge[items] > 0.0
-    seen = int((edge[items[order][owner[shown]]] > 0.0).sum()) / max(int(is_leaf.sum()), 1)
-    return LightView(image.reshape(ny, nx, 3)[::-1], toward, seen)
+    image[obstacle] = _STONE
+    image[(tree >= 0) & (item < 0)] = _WOOD
+    leaf = (tree >= 0) & (item >= 0)
+    row = tree[leaf]
+    node = rows.start[row] + item[leaf]
+    grain = np.modf((item[leaf] + 1) * _GOLDEN)[0]
+    if by == "light":
+        light = stand.arena.metamers.light
+        top = max(float(stand.surroundings.full_light), 1e-9)
+        colour = colormaps["inferno"](0.05 + 0.95 * np.clip(light[node] / top, 0.0, 1.0))[:, :3]
+    elif by == "species":
+        looks = np.array([look_of(kind.name).line for kind in stand.species])
+        colour = looks[rows.species[row]] * (0.75 + 0.35 * grain)[:, None]
+    else:
+        leaves = grain if by == "leaf" else np.zeros(len(row))
+        hue = np.modf(rows.tree_id[row] * _GOLDEN + leaves)[0]
+        value = 0.9 - 0.35 * np.modf(7.0 * leaves)[0]
+        colour = hsv_to_rgb(np.column_stack((hue, np.full(len(hue), 0.6), value)).reshape(-1, 3))
+    image[leaf] = np.asarray(255.0 * np.clip(colour, 0.0, 1.0), np.uint8)
+    return image

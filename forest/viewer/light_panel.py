@@ -12,7 +12,15 @@ import numpy as np
 
 from forest.errors import InputError
 from forest.view.scene import import_pyvista
-from forest.viewer.inside import Slice, exposed, light_slice, markers_around, view_from_light
+from forest.viewer.inside import (
+    LIGHT_COLOURS,
+    LightView,
+    Slice,
+    exposed,
+    light_slice,
+    markers_around,
+    view_from_light,
+)
 
 if TYPE_CHECKING:
     from forest.stand import Stand
@@ -25,6 +33,8 @@ _WAYS = (
     ("markers", "Free markers", "mdi-dots-hexagon"),
     ("sun", "Seen from the light", "mdi-white-balance-sunny"),
 )
+# The pointer's place in the picture, shares of its width and height.
+_PLACE = "$event.offsetX / $event.target.clientWidth, $event.offsetY / $event.target.clientHeight"
 
 
 class LightPanel:
@@ -37,6 +47,7 @@ class LightPanel:
         self._app = app
         self._exposed: tuple[Stand, Stand] | None = None
         self._picture = 0
+        self._seen: LightView | None = None
         app.state.update(
             {
                 "light_height": 2.0,
@@ -44,6 +55,11 @@ class LightPanel:
                 "light_year": None,
                 "light_said": "",
                 "light_image": "",
+                "light_pixels": "",
+                "light_by": "tree",
+                "light_colours": [
+                    {"title": label, "value": name} for name, label in LIGHT_COLOURS.items()
+                ],
                 "light_busy": False,
                 "light_shown": "",
                 "light_top": "",
@@ -52,6 +68,8 @@ class LightPanel:
         trigger = app.server.controller.trigger
         trigger("inside")(self._show)
         trigger("inside_off")(self._clear)
+        trigger("light_pick")(self._pick)
+        app.state.change("light_by")(self._colour_anew)
 
     def build(self) -> None:
         """Make its widgets."""
@@ -100,19 +118,33 @@ class LightPanel:
                 with html.Div(classes="ends quiet"):
                     html.Span("0")
                     html.Span("{{ light_top }}")
-            html.Img(
-                v_if=("light_image",),
-                src=("light_image",),
-                alt="The stand seen from the light",
-                style="width: 100%; border-radius: 4px; margin-top: 6px;",
-                id="light-view",
-            )
+            with html.Div(v_if=("light_image",)):
+                v.VSelect(
+                    v_model=("light_by",),
+                    items=("light_colours",),
+                    label="Colour leaves by",
+                    density="compact",
+                    variant="outlined",
+                    hide_details=True,
+                    classes="mt-2",
+                    id="light-by",
+                )
+                html.Div("{{ light_pixels }}", classes="quiet mt-2", id="light-pixels")
+                html.Img(
+                    src=("light_image",),
+                    alt="The stand seen from the light",
+                    style="width: 100%; border-radius: 4px; margin-top: 6px; cursor: pointer; "
+                    "image-rendering: pixelated;",
+                    click=f"trigger('light_pick', [{_PLACE}])",
+                    id="light-view",
+                )
 
     def refresh(self) -> None:
         """Say whether the year's stand is known."""
         state = self._app.state
         if state.tab != "light":
             return
+        self._say_pixels()
         try:
             state.light_year = self._app.source.stand_year(self._app.year)
             state.light_why_not = ""
@@ -126,17 +158,28 @@ class LightPanel:
             "slice": self._slice,
             "markers": self._markers,
             "sun": self._sun,
+            "again": self._sun,
         }[way]
-        app.state.update({"light_busy": True, "light_image": "", "light_top": ""})
+        app.state.update({"light_busy": True, "light_top": ""})
+        if way != "again":
+            app.state.light_image = ""
         app.state.light_said = "reckoning (the first time on a machine takes a minute)"
         app.state.flush()
         try:
-            stand = await asyncio.to_thread(self._stand)
+            stand = await asyncio.to_thread(self._reckon, way)
             app.state.light_said = draw(stand)
-            app.state.light_shown = way
+            app.state.light_shown = "sun" if way == "again" else way
         except InputError as error:
             app.state.light_said = str(error)
         app.state.light_busy = False
+
+    def _reckon(self, way: str) -> Stand:
+        """Get the stand ready, and the light's view of it if that is wanted, beside the page."""
+        stand = self._stand()
+        if way in ("sun", "again"):
+            self._picture += way == "sun"
+            self._seen = view_from_light(stand, self._picture - 1, self._app.state.light_by)
+        return stand
 
     def _stand(self) -> Stand:
         stand = self._app.source.stand_near(self._app.year)
@@ -173,19 +216,45 @@ class LightPanel:
     def _sun(self, stand: Stand) -> str:
         from PIL import Image
 
-        seen = view_from_light(stand, self._picture)
-        self._picture += 1
+        seen = self._seen
+        assert seen is not None
         buffer = BytesIO()
         Image.fromarray(np.ascontiguousarray(seen.image)).save(buffer, "PNG")
         coded = base64.b64encode(buffer.getvalue()).decode("ascii")
         self._app.state.light_image = f"data:image/png;base64,{coded}"
+        self._say_pixels()
         elevation = np.degrees(np.arcsin(seen.toward[2]))
         azimuth = np.degrees(np.arctan2(seen.toward[0], seen.toward[1])) % 360.0
         return (
-            f"Light from {azimuth:.0f}° (north 0, east 90), {elevation:.0f}° high. Each tree's "
-            f"leaves have a colour; {100 * seen.seen:.0f} % of the leaf area is lit. "
+            f"Light from {azimuth:.0f}° (north 0, east 90), {elevation:.0f}° high; "
+            f"{100 * seen.share:.0f} % of the leaf area is lit. Wood is brown. "
             "Once more: another place of the light."
         )
+
+    async def _colour_anew(self, **_: object) -> None:
+        if self._seen is not None:
+            with self._app.state:
+                await self._show("again")
+
+    def _pick(self, across: float, down: float) -> None:
+        """Choose the tree that the light sees there."""
+        if self._seen is None:
+            return
+        lines, columns = self._seen.tree_id.shape
+        line = min(max(int(down * lines), 0), lines - 1)
+        column = min(max(int(across * columns), 0), columns - 1)
+        tree_id = int(self._seen.tree_id[line, column])
+        self._app.choose(tree_id or None, card=False)
+
+    def _say_pixels(self) -> None:
+        """Say how many pixels the chosen tree has."""
+        said = "Click a leaf: how much of its tree the light sees."
+        chosen = self._app.chosen
+        if self._seen is not None and chosen is not None:
+            lit = self._seen.lit
+            share = lit.get(chosen, 0) / max(sum(lit.values()), 1)
+            said = f"Tree {chosen}: {lit.get(chosen, 0):,} lit pixels, {100 * share:.1f} % of all."
+        self._app.state.light_pixels = said
 
 
 def _top(cut: Slice) -> float:

@@ -49,8 +49,7 @@ class LivePart:
             if app.chosen is None or not self.desk.source.come_near(app.chosen):
                 return
             app.state.branches_known = True
-            if app.state.branches:
-                app.soon(app.show_year)
+            app.soon(app.come_closer)
 
         def lay_down() -> None:
             for tool in tools:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from forest.live import LiveSession
     from forest.scenario import Scenario
     from forest.stand import Stand
+    from forest.surface.export import Part
     from forest.trees.skeleton import Skeleton
 
 _MOST_METAMERS = 60_000  # of all trees that are shown with their branches
@@ -187,6 +188,18 @@ class LiveSource:
                 self._recorded = folder
             with open_run(Path(self._recorded.name) / "run.h5") as run:
                 return run.disc(tree_id, height_m, year=year)
+
+    def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
+        """Surface of a living tree; its bark needs the rings of all its years, from a run file."""
+        from forest.viewer.surfaces import wood_parts
+
+        if shape == "bark":
+            raise InputError(
+                "bark is grown along a run file's rings", expected="forest view RUN.h5"
+            )
+        species = {kind.name: kind for kind in self.scenario.species_list}
+        skeleton = self.skeleton(tree_id, year)
+        return wood_parts(skeleton, species[skeleton.species], shape)
 
     def stand_near(self, year: int) -> Stand:
         """A copy of the stand as it is now."""

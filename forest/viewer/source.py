@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from forest.record.run import Run
     from forest.scenario import Scenario
     from forest.stand import Stand
+    from forest.surface.export import Part
     from forest.trees.skeleton import Skeleton
 
 _CACHED_YEARS = 64
@@ -114,6 +115,12 @@ class Source(Protocol):
     def disc(self, tree_id: int, height_m: float, year: int) -> Disc:
         """A disc out of a stem; InputError if there is none."""
 
+    def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
+        """Surface of a tree, "tubes", "blended" or with its "bark"; InputError if it has none.
+
+        Called in a thread of its own.
+        """
+
     def stand_near(self, year: int) -> Stand:
         """The stand with all its buds, as near to a year as it is known; InputError if it is not.
 
@@ -199,6 +206,12 @@ class RunSource:
     def disc(self, tree_id: int, height_m: float, year: int) -> Disc:
         """A disc, of a sample tree at any height, of others where `/rings` has one."""
         return self._run.disc(tree_id, height_m, year=year)
+
+    def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
+        """Surface of a sample tree."""
+        from forest.viewer.surfaces import surface_parts
+
+        return surface_parts(self._run, tree_id, year, shape)
 
     def stand_near(self, year: int) -> Stand:
         """The stand of the checkpoint that is nearest to a year."""

@@ -69,6 +69,9 @@ class Stage:
         self.plotter.render_window.SetMultiSamples(0)
         self.plotter.set_background(_SKY[0], top=_SKY[1])
         self.plotter.enable_terrain_style(mouse_wheel_zooms=True)
+        for towards, strength in ((SUN, 0.85), (SUN * (-1.0, -1.0, 0.6), 0.4)):
+            lamp = pv.Light(position=tuple(towards), intensity=strength, light_type="scene light")
+            self.plotter.add_light(lamp)  # for what has no light baked into it
         self._bodies = Bodies(
             np.zeros((0, 3), np.float32),
             np.zeros((0, 3), np.int32),
@@ -82,6 +85,7 @@ class Stage:
         self._mesh: Any = None
         self._chosen: int | None = None
         self._skeletons: dict[int, Skeleton] = {}
+        self._dressed: int | None = None
         self._extras: dict[str, list[str]] = {}
         self._top = 1.0
         self._lay_ground()
@@ -90,6 +94,11 @@ class Stage:
     def window(self) -> Any:
         """The render window."""
         return self.plotter.render_window
+
+    @property
+    def skeletons(self) -> tuple[int, ...]:
+        """The trees that are shown with their branches."""
+        return tuple(self._skeletons)
 
     # ------------------------------------------------------------------ trees
 
@@ -153,6 +162,15 @@ class Stage:
         self._paint()
         self._mark()
 
+    def dress(self, tree_id: int | None) -> None:
+        """Leave the drawing of a tree's branches to a surface that was put in; None does not.
+
+        The pointer still finds its metamers.
+        """
+        if tree_id != self._dressed:
+            self._dressed = tree_id
+            self.put("branches", self._add_branches if self._skeletons else None)
+
     def _place_bodies(self) -> None:
         pv = import_pyvista()
         bodies = self._bodies
@@ -197,7 +215,9 @@ class Stage:
         self._add(ring, "chosen", color=_CHOSEN)
 
     def _add_branches(self, plotter: Any) -> None:
-        Scene(list(self._skeletons.values()), leaves=True, least_radius_m=0.004).add_to(plotter)
+        drawn = [shape for tree_id, shape in self._skeletons.items() if tree_id != self._dressed]
+        if drawn:
+            Scene(drawn, leaves=True, least_radius_m=0.004).add_to(plotter)
 
     # ------------------------------------------------------------------ the rest of the scene
 
@@ -216,6 +236,22 @@ class Stage:
             before = set(self.plotter.actors)
             add(self.plotter)
             self._extras[name] = [key for key in self.plotter.actors if key not in before]
+
+    def filled_by(
+        self, places: NDArray[np.float64], height_m: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Give the share of the picture's height that trees of these middles (n, 3) fill."""
+        camera = self.plotter.camera
+        away = np.linalg.norm(places - np.asarray(camera.position), axis=1)
+        before = (places - np.asarray(camera.position)) @ self.looks > -0.5 * height_m
+        seen = 2.0 * np.maximum(away, 0.1) * np.tan(np.radians(0.5 * camera.view_angle))
+        return np.asarray(np.where(before, height_m / seen, 0.0), np.float64)
+
+    def when_moved(self, tell: Callable[[], None]) -> None:
+        """Call something whenever the user has turned the view or come nearer."""
+        released = [f"{button}ButtonReleaseEvent" for button in ("Left", "Middle", "Right")]
+        for event in (*released, "MouseWheelForwardEvent", "MouseWheelBackwardEvent"):
+            self.plotter.iren.interactor.AddObserver(event, lambda *_: tell())
 
     def look(self, way: str) -> None:
         """Point the camera at the whole stand from one of `LOOKS`."""

@@ -158,6 +158,7 @@ def _run_lines(result: dict[str, Any]) -> Iterator[Line]:
     yield Line(f"Maps of a trunk, {maps['size']} x {maps['size']}", ())
     for key, what in (("maps", "4K set: textures, maps, s"), ("save", "4K set: its PNGs, s")):
         yield Line(what, (f"{maps[key + '_s']:.1f}", f"{maps[key + '_cpu_s']:.1f}"))
+    yield from _viewer_lines(result["viewer"])
     starts = result["starts"]
     yield Line("Start", ())
     cold = (f"{starts['cold_s']:.1f}", f"{starts['cold_cpu_s']:.1f}")
@@ -202,6 +203,20 @@ def _bark_lines(cases: dict[str, Any]) -> Iterator[Line]:
         if name != "paper_s":
             what = f"{name}, {case['elements']:,} elements, s"
             yield Line(what, (f"{case['wall_s']:.2f}", f"{case['cpu_s']:.2f}"))
+
+
+def _viewer_lines(viewer: dict[str, Any]) -> Iterator[Line]:
+    yield Line(f"The viewer with a stand of {viewer['trees']:,} trees", ())
+    for key, what in (
+        ("open", "opening: the app and its first picture, s"),
+        ("year", "another year and its picture, s"),
+        ("frame", "a picture while the view turns, JPEG included, s"),
+    ):
+        yield Line(what, (f"{viewer[key + '_s']:.3g}", f"{viewer[key + '_cpu_s']:.3g}"))
+    yield Line("pictures per second", (f"{1.0 / viewer['frame_s']:.0f}",))
+    if viewer["browser_fps"] == viewer["browser_fps"]:  # NaN without a browser
+        yield Line("the same that reach a browser", (f"{viewer['browser_fps']:.0f}",))
+    yield Line("peak memory, GB", (f"{viewer['peak_mb'] / 1024.0:.2f}",))
 
 
 def _scene_lines(scene: dict[str, Any]) -> Iterator[Line]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -102,7 +104,7 @@ def test_equals_twin(seed, periodic, pixel_m, with_obstacles):
     light.expose(metamers, trees, 3)
     toward, *shift = light._path.draw(seed, 3, 0)
     turns = (round(2.0 / pixel_m), round(1.5 / pixel_m)) if periodic else None
-    twin = rendered_light(
+    twin, in_pixel = rendered_light(
         metamers,
         trees,
         leaf_area=area,
@@ -114,9 +116,38 @@ def test_equals_twin(seed, periodic, pixel_m, with_obstacles):
         shift=tuple(shift),
         turns=turns,
     )
-    for start, size in zip(trees.start, trees.size, strict=True):
-        for k in range(start, start + size):
-            assert metamers.light[k] == np.float32(twin.get(k, 0.0))
+    nodes = np.concatenate(
+        [
+            np.arange(start, start + size)
+            for start, size in zip(trees.start, trees.size, strict=True)
+        ]
+    )
+    assert all(metamers.light[k] == np.float32(twin.get(k, 0.0)) for k in nodes)
+    before = metamers.light.copy()
+    picture = light.picture(metamers, trees, 3)
+    np.testing.assert_array_equal(metamers.light, before)
+    assert all(picture.share[k] == np.float32(twin.get(k, 0.0)) for k in nodes)
+    assert _in_pixels(picture, trees, periodic) == _as_known(in_pixel, periodic)
+
+
+def _in_pixels(picture, trees, periodic):
+    """What each pixel of an index picture shows, by its place on a torus; else only how often."""
+    found = {}
+    for j, i in np.ndindex(*picture.tree.shape):
+        tree, item = picture.tree[j, i], picture.item[j, i]
+        if picture.obstacle[j, i]:
+            found[i, j] = ("voxel", -1)
+        elif tree >= 0:
+            kind, own = ("leaf", item) if item >= 0 else ("limb", -1 - item)
+            found[i, j] = (kind, int(trees.start[tree] + own))
+    return _as_known(found, periodic)
+
+
+def _as_known(found, periodic):
+    if periodic:
+        return found
+    # The window of an open plot lies around its leaves; limbs and walls may stand out of it.
+    return Counter(what for what in found.values() if what[0] == "leaf")
 
 
 def test_a_lone_leaf_has_full_light():

@@ -76,10 +76,11 @@ def rendered_light(
     pixel: tuple[float, float],
     shift: tuple[float, float],
     turns: tuple[int, int] | None,
-) -> dict[int, float]:
-    """Give the part of each leaf that is seen, by metamer.
+) -> tuple[dict[int, float], dict[tuple[int, int], tuple[str, int]]]:
+    """Give the part of each leaf that is seen, by metamer, and what is seen in each pixel.
 
-    `turns` are the pixels of a torus along x and y, or None on an open plot.
+    That is its kind and its metamer, or -1 for a voxel. `turns` are the pixels of a torus along x
+    and y, or None on an open plot.
     """
     shapes = list_shapes(metamers, trees, leaf_area, exponent)
     shapes += [("voxel", np.array(v) * voxel_m, voxel_m) for v in voxels]
@@ -111,7 +112,8 @@ def rendered_light(
             spot = (spot[0] % turns[0], spot[1] % turns[1])
         above = nearest.get(spot, (np.float32(-np.inf), 0))[0]
         light[k] = 1.0 if above <= np.float32(place[2]) else 0.0
-    return light
+    kinds = [(shape[0], -1 if shape[0] == "voxel" else shape[1]) for shape in shapes]
+    return light, {spot: kinds[number] for spot, (_, number) in nearest.items()}
 
 
 def _candidates(shape, slope: np.ndarray, pixel, shift):

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-_PATIENCE_S = 120.0
+_PATIENCE_S = 400.0  # what ends a test that hangs; kernels may have to be compiled before
 
 
 class Viewing:

@@ -9,7 +9,14 @@ from forest.environment.marker_places import free_markers
 from forest.environment.markers import Envelope, MarkerSpace
 from forest.errors import InputError
 from forest.stand import Stand
-from forest.viewer.inside import exposed, light_slice, markers_around, view_from_light
+from forest.viewer.inside import (
+    LIGHT_COLOURS,
+    LightView,
+    exposed,
+    light_slice,
+    markers_around,
+    view_from_light,
+)
 from tests.reference.markers import marker_of_cell
 from tests.tiny import assert_same_state, steps, tiny
 
@@ -42,12 +49,34 @@ def test_slices_are_the_far_field_and_full_light_above_it(stand: Stand) -> None:
 
 
 def test_the_light_sees_some_leaves_and_no_more_than_all(stand: Stand) -> None:
-    seen = view_from_light(exposed(stand))
-    assert 0.0 < seen.seen <= 1.0
-    assert len(np.unique(seen.image.reshape(-1, 3), axis=0)) > 10
+    copy = exposed(stand)
+    seen = view_from_light(copy)
+    assert 0.0 < seen.share <= 1.1  # leaves between the pixels may count as whole
     again = view_from_light(exposed(stand))
     np.testing.assert_array_equal(seen.image, again.image)
-    assert (view_from_light(exposed(stand), 1).toward != seen.toward).any()
+    assert (view_from_light(copy, 1).toward != seen.toward).any()
+    colours = {
+        by: len(np.unique(_of(view_from_light(copy, by=by)), axis=0)) for by in LIGHT_COLOURS
+    }
+    assert colours["leaf"] > colours["tree"] > 2
+    assert set(seen.lit) == set(copy.rows.tree_id.tolist())
+    assert set(np.unique(seen.tree_id)) - {0} <= set(seen.lit)
+
+
+def _of(seen: LightView) -> np.ndarray:
+    return seen.image.reshape(-1, 3)
+
+
+def test_rendered_light_is_what_the_picture_shows() -> None:
+    """Of one picture a year, leaves' light is the share of them that the picture shows."""
+    grown = Stand(tiny("environment={rendered={directions=1}}"))
+    steps(grown, 4)
+    copy = exposed(grown)
+    picture = copy.surroundings.picture(copy.arena.metamers, copy.rows, copy.steps)
+    for start, size in zip(copy.rows.start, copy.rows.size, strict=True):
+        here = slice(start, start + size)
+        np.testing.assert_array_equal(picture.share[here], copy.arena.metamers.light[here])
+    assert picture.share.max() > 0.0
 
 
 def test_all_markers_of_a_box_are_listed() -> None:

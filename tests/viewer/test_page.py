@@ -126,6 +126,14 @@ def test_light_is_sliced_from_the_nearest_checkpoint(page: Any) -> None:
     changed(page, before)
     page.click("#inside-sun")
     page.wait_for_selector("#light-view", timeout=60_000)
+    page.click("#light-view")
+    page.wait_for_selector("#light-pixels")
+    first = page.get_attribute("#light-view", "src")
+    page.click("#light-by", force=True)
+    page.click(".v-list-item:has-text('Species')")
+    page.wait_for_function(
+        "old => document.querySelector('#light-view')?.src != old", arg=first, timeout=60_000
+    )
     page.click("#inside-off")
     page.click(".v-tab:has-text('Stand')")
 
