@@ -87,7 +87,7 @@ def _named(events: pd.DataFrame) -> pd.DataFrame:
 def test_all_of_it_happens(variant: str, straight: Run) -> None:
     """The proofs below are of a forest in which every part has its say."""
     events = _named(straight.events)
-    assert set(events["kind"]) == set(OF_KIND) - {"marked", "bent"}  # tests/management has these
+    assert set(events["kind"]) == set(OF_KIND)
     assert HAPPENS[variant] <= set(events["cause"])
     assert set(FELLING_CAUSES) <= set(events["cause"])
     thrown = straight.storms[straight.storms["outcome"] != "stood"]
