@@ -353,8 +353,11 @@ def _check_felled_once(acts: Sequence[Act], years: range) -> None:
         if isinstance(act, ChosenTrees | Stroke):
             ids, key = act.ids, act.ids_key
         else:
-            one = isinstance(act, Bend | Crack)
-            ids, key = ((act.tree_id,), "tree_id") if one else (act.tree_ids, "tree_ids")
+            ids, key = (
+                ((act.tree_id,), "tree_id")
+                if isinstance(act, Bend | Crack)
+                else (act.tree_ids, "tree_ids")
+            )
         for tree_id in ids:
             if tree_id in felled:
                 by, then = felled[tree_id]

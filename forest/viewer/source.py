@@ -122,7 +122,7 @@ class Source(Protocol):
         """
 
     def waiting_for(self, tree_id: int) -> str:
-        """What waits to be done to a tree's shape or bark: a text that changes with it; "" for nothing."""
+        """What waits to be done to a tree's shape or bark, as a text; "" for nothing."""
 
     def stand_near(self, year: int) -> Stand:
         """The stand with all its buds, as near to a year as it is known; InputError if it is not.

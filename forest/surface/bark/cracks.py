@@ -82,7 +82,7 @@ def recorded_cracks(run: Run, tree_id: int, year: int) -> tuple[Crack, ...]:
         return ()
     if "treatments" in run.tables:
         done = run.treatments[["year", "act"]].drop_duplicates()
-        pairs = zip(done["year"].tolist(), done["act"].tolist(), strict=True)
+        pairs = list(zip(done["year"].tolist(), done["act"].tolist(), strict=True))
     else:
         if any(act.when is not None for act in acts.values()):
             raise InputError(
@@ -91,7 +91,7 @@ def recorded_cracks(run: Run, tree_id: int, year: int) -> tuple[Crack, ...]:
             )
         years = [int(each) for each in run.years]
         start = run.scenario.start_year
-        pairs = ((y, i) for y in years for i in acts if acts[i].may_be_in(y, start))
+        pairs = [(y, i) for y in years for i in acts if acts[i].may_be_in(y, start)]
     return tuple(
         Crack(y, acts[i].height_m, acts[i].azimuth_deg) for y, i in pairs if i in acts and y <= year
     )
