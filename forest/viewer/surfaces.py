@@ -139,7 +139,7 @@ class Surfaces:
         if self._shown is None or self._shown.shape != "bark":
             return None
         met = [
-            first_triangle(np.float32(part.mesh.points), part.mesh.triangles, ray)
+            first_triangle(part.mesh.points.astype(np.float32), part.mesh.triangles, ray)
             for part in self._kept[self._shown]
             if part.material.name.startswith("bark")
         ]

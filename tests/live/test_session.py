@@ -132,7 +132,7 @@ def worked() -> LiveSession:
     session.act(kind="stroke", points_m=[[5, 5, 1]], radius_m=0.5)
     to = session.skeleton(3).end[1] + np.array([0.02, 0.01, 0.0])
     session.act(kind="bend", tree_id=3, metamer=1, to_m=to.tolist())
-    session.act(kind="crack", tree_id=1, height_m=0.1, azimuth_deg=40.0)
+    session.act(kind="crack", tree_id=3, height_m=0.1, azimuth_deg=40.0)
     session.step()
     session.act(
         kind="harvest", method="gap", gap={"kind": "circle", "x_m": 3, "y_m": 3, "radius_m": 2}
