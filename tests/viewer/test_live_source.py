@@ -74,7 +74,8 @@ def test_its_stand_is_a_copy_and_its_discs_are_those_of_the_run(source: LiveSour
     before = source.session.stand.arena.metamers.light.copy()
     copy.step()
     assert source.session.year == 2003
-    assert np.array_equal(source.session.stand.arena.metamers.light, before)
+    light = source.session.stand.arena.metamers.light
+    assert np.array_equal(light, before, equal_nan=True)  # unused rows may hold anything
     disc = source.disc(2, 0.1, 2003)
     assert disc.years[-1] == 2003
 
