@@ -35,6 +35,7 @@ OF_KIND = {
     "pruned": {"none"},
     "marked": {"none"},
     "bent": {"none"},
+    "cracked": {"none"},
     "died": set(DEATH_CAUSES),
     "felled": set(FELLING_CAUSES),
     "windthrown": {"wind"},
@@ -87,7 +88,7 @@ def _named(events: pd.DataFrame) -> pd.DataFrame:
 def test_all_of_it_happens(variant: str, straight: Run) -> None:
     """The proofs below are of a forest in which every part has its say."""
     events = _named(straight.events)
-    assert set(events["kind"]) == set(OF_KIND) - {"marked", "bent"}  # tests/management has these
+    assert set(events["kind"]) == set(OF_KIND)
     assert HAPPENS[variant] <= set(events["cause"])
     assert set(FELLING_CAUSES) <= set(events["cause"])
     thrown = straight.storms[straight.storms["outcome"] != "stood"]
