@@ -99,6 +99,13 @@ metamer = 1
 to_m = [3.7, 6.11, 0.38]
 
 [[acts]]
+kind = "crack"
+years = [2003, 2005]
+tree_id = 9
+height_m = 0.1
+azimuth_deg = 250
+
+[[acts]]
 kind = "obstacle"
 year = 2004
 add = {{ kind = "box", name = "wall", min_m = [4.0, 3.0, 0.4], max_m = [4.6, 7.0, 1.0] }}

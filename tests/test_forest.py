@@ -35,6 +35,7 @@ OF_KIND = {
     "pruned": {"none"},
     "marked": {"none"},
     "bent": {"none"},
+    "cracked": {"none"},
     "died": set(DEATH_CAUSES),
     "felled": set(FELLING_CAUSES),
     "windthrown": {"wind"},

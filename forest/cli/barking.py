@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from forest.record.wood import YearlyWood
+    from forest.surface.bark.cracks import Crack
     from forest.surface.bark.presets import Preset
     from forest.surface.bark.tree_bark import TreeBark
     from forest.surface.blend.foot import Flare
@@ -170,6 +171,7 @@ def bark(
             law=law,
             flare=None if round_foot else chosen.flare,
             least_radius_m=least_radius,
+            cracks=() if shrink else chosen.cracks,
         )
     written = _write(grown, chosen.skeleton, choices)
     rings, cracks = len(grown.bark.strips.axis), len(grown.bark.fractures.origin)
@@ -282,6 +284,7 @@ class _Chosen:
     wood: YearlyWood | None
     flare: Flare | None
     name: str
+    cracks: tuple[Crack, ...] = ()
 
 
 def _tree(
@@ -302,6 +305,7 @@ def _tree(
     assert run_file is not None
     from forest.record.run import open_run
     from forest.record.wood import yearly_wood
+    from forest.surface.bark.cracks import recorded_cracks
 
     with open_run(run_file) as run:
         if tree is None:
@@ -310,8 +314,8 @@ def _tree(
         check_sample(run, tree)
         at = int(run.sample_years(tree)[-1]) if year is None else year
         skeleton = run.skeleton(tree, at)
-        wood = yearly_wood(run, skeleton, at)
-    return _Chosen(skeleton, wood, usual_flare(skeleton), f"tree {tree} in {at}")
+        wood, cracks = yearly_wood(run, skeleton, at), recorded_cracks(run, tree, at)
+    return _Chosen(skeleton, wood, usual_flare(skeleton), f"tree {tree} in {at}", cracks)
 
 
 def _write(grown: TreeBark, skeleton: Skeleton, choices: _Choices) -> str:

@@ -49,6 +49,8 @@ def act(stand: Stand, traits: SpeciesTraits) -> None:
         measures, _ = cut(stand, number, cuts, kappa, measures)
     for number, bending in plan.bendings.items():
         measures, _ = bend(stand, number, bending, measures)
+    for number, tree_id in plan.cracks.items():
+        crack(stand, number, tree_id, measures)
     for number, felling in plan.fellings.items():
         measures = fell(stand, number, felling, measures)
     for number, places in plan.plantings.items():
@@ -142,6 +144,13 @@ def bend(
         after = stand_now(stand, measures)
     stand.treatments.note(act, "bend", before, after)
     return measures, left
+
+
+def crack(stand: Stand, act: int, tree_id: int, measures: TreeMeasures) -> None:
+    """Note that a tree's bark is torn, which whoever draws its bark does; see `cut`."""
+    stand.pending.append(Event.of(stand, stand.row_of(tree_id), "cracked", "none", measures))
+    here = stand_now(stand, measures)
+    stand.treatments.note(act, "crack", here, here)
 
 
 def fell(stand: Stand, act: int, felling: Felling, measures: TreeMeasures) -> TreeMeasures:

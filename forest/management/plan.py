@@ -20,7 +20,7 @@ from forest.measure.trees import TreeMeasures
 from forest.scenario.acts import Act, Fell, Plant, Planted, Prune, Pruning
 from forest.scenario.choosing import ChosenTrees
 from forest.scenario.cuttings import Harvest, Thin
-from forest.scenario.shaping import Bend, Bending, ChangeObstacle, Mark, ObstacleChange
+from forest.scenario.shaping import Bend, Bending, ChangeObstacle, Crack, Mark, ObstacleChange
 from forest.scenario.strokes import Stroke
 from forest.species.schema import Refusal
 from forest.species.text import input_error
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 _TIMES = 1 << 14
 
 #: In which order the kinds of acts are done in a year; those that fell are not named.
-_ORDER = {"mark": 0, "obstacle": 1, "prune": 2, "bend": 3, "plant": 5, "stroke": 6}
-_FELLING = 4
+_ORDER = {"mark": 0, "obstacle": 1, "prune": 2, "bend": 3, "crack": 4, "plant": 6, "stroke": 7}
+_FELLING = 5
 
 
 class Places(NamedTuple):
@@ -73,7 +73,8 @@ class YearOfActs(NamedTuple):
     ----------
     measures : TreeMeasures
         Of the stand before them.
-    markings, changes, prunings, bendings, fellings, plantings, strokes : dict by number of the act
+    markings, changes, prunings, bendings, cracks : dict by number of the act
+    fellings, plantings, strokes : dict by number of the act
     triggers : list of int
         Acts that a trigger fired.
     """
@@ -83,6 +84,7 @@ class YearOfActs(NamedTuple):
     changes: dict[int, Change]
     prunings: dict[int, Cuts]
     bendings: dict[int, Bending]
+    cracks: dict[int, int]  # the tree
     fellings: dict[int, Felling]
     plantings: dict[int, Places]
     strokes: dict[int, Drawn]
@@ -96,6 +98,8 @@ class YearOfActs(NamedTuple):
             yield "prune", cuts
         for bending in self.bendings.values():
             yield "bend", (bending.tree_id,)
+        for tree_id in self.cracks.values():
+            yield "crack", (tree_id,)
         for felling in self.fellings.values():
             yield "fell", felling.tree_ids
 
@@ -149,13 +153,13 @@ def plan_year(stand: Stand, year: int) -> YearOfActs | None:
     if not due:
         return None
     triggers = [i for i, act in due if act.when is not None]
-    plan = YearOfActs(measures, {}, {}, {}, {}, {}, {}, {}, triggers)
+    plan = YearOfActs(measures, {}, {}, {}, {}, {}, {}, {}, {}, triggers)
     census = census_of(stand, measures)
     standing = np.ones(len(census.tree_id), np.bool_)
     first = stand.treatments.number + 1
     for k, (i, act) in enumerate(due):
         try:
-            if isinstance(act, Prune | Bend | ChangeObstacle | Plant | Stroke):
+            if isinstance(act, Prune | Bend | Crack | ChangeObstacle | Plant | Stroke):
                 continue
             if isinstance(act, Mark):
                 rows = chosen_rows(act, stand, census, standing, f"acts[{i}].{{}} in {year}", plan)
@@ -184,7 +188,7 @@ def _plan_shapes(
     census: Census,
     standing: Mask,
 ) -> None:
-    """Find out what changes the shape of trees: obstacles, prunings, bendings."""
+    """Find out what changes the shape of trees: obstacles, prunings, bendings; and cracks."""
     obstacles = stand.obstacles.now
     for i, act in due:
         where = f"acts[{i}].{{}} in {year}"
@@ -197,6 +201,16 @@ def _plan_shapes(
             row_of(stand.rows, act.tree_id, where=where.format("tree_id"))
             plan.bendings[i] = act
             plan.shape_of(stand, act.tree_id)
+        elif isinstance(act, Crack):
+            row = row_of(stand.rows, act.tree_id, where=where.format("tree_id"))
+            height = float(plan.measures.height_m[row])
+            if act.height_m > height:
+                raise InputError(
+                    f"{act.height_m:g} m is above tree {act.tree_id}",
+                    where=where.format("height_m"),
+                    expected=f"0 to {height:.3g} m",
+                )
+            plan.cracks[i] = act.tree_id
 
 
 def _plan_new(

@@ -21,7 +21,10 @@ FILE_TYPE = "forest run"
 SCHEMA_VERSION = 2
 
 STATUS = ("living", "dead")
-EVENT_KINDS = ("planted", "recruited", "died", "felled", "pruned", "windthrown", "marked", "bent")
+EVENT_KINDS = (
+    *("planted", "recruited", "died", "felled", "pruned", "windthrown", "marked", "bent"),
+    "cracked",
+)
 CAUSES = (
     "none",
     "suppression",
@@ -57,8 +60,11 @@ DEATH_CAUSES = (
 )
 FELLING_CAUSES = ("thinning", "harvest", "tending")
 #: Events that change nothing in the number of trees.
-STAYING_KINDS = ("pruned", "marked", "bent")
-ACT_KINDS = ("prune", "fell", "plant", "thin", "harvest", "mark", "bend", "obstacle", "stroke")
+STAYING_KINDS = ("pruned", "marked", "bent", "cracked")
+ACT_KINDS = (
+    *("prune", "fell", "plant", "thin", "harvest", "mark", "bend", "obstacle", "stroke"),
+    "crack",
+)
 STAGES = ("before", "after")
 RESIDUAL_STATUS = ("standing", "felled")
 

@@ -14,7 +14,7 @@ from forest.scenario.cuttings import Harvest, Rule, Thin, check_rule
 from forest.scenario.model import PlantedTree, Plot
 from forest.scenario.placing import MOST_TREES, random_count
 from forest.scenario.regions import Region, check_region
-from forest.scenario.shaping import Bend, ChangeObstacle, Mark
+from forest.scenario.shaping import Bend, ChangeObstacle, Crack, Mark
 from forest.scenario.strokes import Stroke
 from forest.scenario.timing import Timing, check_timing
 from forest.species.schema import Refusal, Table, quantity
@@ -264,7 +264,7 @@ class Plant(Planted, Timing):
 
 
 Act = Annotated[
-    Prune | Fell | Plant | Thin | Harvest | Mark | Bend | ChangeObstacle | Stroke,
+    Prune | Fell | Plant | Thin | Harvest | Mark | Bend | Crack | ChangeObstacle | Stroke,
     Field(discriminator="kind"),
 ]
 
@@ -346,7 +346,7 @@ def _check_felled_once(acts: Sequence[Act], years: range) -> None:
     by_id = [
         (year, order.get(act.kind, 0), i, act)
         for i, act in enumerate(acts)
-        if act.when is None and isinstance(act, Prune | Fell | Mark | Bend | Stroke)
+        if act.when is None and isinstance(act, Prune | Fell | Mark | Bend | Crack | Stroke)
         for year in act.calendar_years(years)
     ]
     for year, _, i, act in sorted(by_id, key=lambda entry: entry[:3]):
@@ -354,7 +354,9 @@ def _check_felled_once(acts: Sequence[Act], years: range) -> None:
             ids, key = act.ids, act.ids_key
         else:
             ids, key = (
-                ((act.tree_id,), "tree_id") if isinstance(act, Bend) else (act.tree_ids, "tree_ids")
+                ((act.tree_id,), "tree_id")
+                if isinstance(act, Bend | Crack)
+                else (act.tree_ids, "tree_ids")
             )
         for tree_id in ids:
             if tree_id in felled:

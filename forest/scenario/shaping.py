@@ -1,4 +1,4 @@
-"""Acts that mark trees, bend branches, and put up, move and take away obstacles."""
+"""Acts that mark trees, bend branches, crack bark, and put up, move and take away obstacles."""
 
 from __future__ import annotations
 
@@ -59,6 +59,33 @@ class Bend(Bending, Timing):
     """Bend a branch or a stem, and tie it: it keeps the shape."""
 
     kind: Literal["bend"] = quantity("bend", "kind of act", unit="")
+
+
+class Cracking(Table):
+    """Where on a stem the bark is torn."""
+
+    tree_id: Id = quantity(..., "the tree", unit="")
+    height_m: float = quantity(
+        ..., "height above the stem's foot, within the tree", unit="m", ge=0, le=200
+    )
+    azimuth_deg: float = quantity(
+        ...,
+        "side of the stem: azimuth from x (0) towards y (90)",
+        unit="degree",
+        ge=-360,
+        le=360,
+    )
+
+    @property
+    def in_words(self) -> str:
+        """Say what is done."""
+        return "crack"
+
+
+class Crack(Cracking, Timing):
+    """Start a fracture in the bark of a stem; growth does not heed it."""
+
+    kind: Literal["crack"] = quantity("crack", "kind of act", unit="")
 
 
 class ObstacleChange(Table):

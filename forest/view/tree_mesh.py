@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from forest.errors import InputError
@@ -11,6 +11,7 @@ from forest.record.wood import yearly_wood
 from forest.species import Species
 from forest.surface.bark.axes import LEAST_RADIUS_M
 from forest.surface.bark.bark_mesh import dressed_parts
+from forest.surface.bark.cracks import Crack, recorded_cracks
 from forest.surface.bark.presets import Preset
 from forest.surface.bark.tree_bark import bark_tree
 from forest.surface.bark.usual import usual_preset
@@ -120,11 +121,16 @@ def barked_parts(
     wood: Mesh,
     *,
     least_radius_m: float = LEAST_RADIUS_M,
+    waiting: Sequence[Crack] = (),
 ) -> list[Part]:
-    """Put the usual bark of a sample tree's species on its wood, torn as the tree grew."""
+    """Put the usual bark of a sample tree's species on its wood, torn as the tree grew.
+
+    Its cracks are those of the run's acts up to the year, and any that wait for the next.
+    """
     preset = Preset.load(usual_preset(skeleton.species))
     rings = yearly_wood(run, skeleton, year)
-    grown = bark_tree(skeleton, preset, 1, wood=rings, least_radius_m=least_radius_m)
+    cracks = (*recorded_cracks(run, skeleton.tree_id, year), *waiting)
+    grown = bark_tree(skeleton, preset, 1, wood=rings, least_radius_m=least_radius_m, cracks=cracks)
     return dressed_parts(grown, wood)
 
 

@@ -58,6 +58,8 @@ class App:
     server : trame_server.Server
     source : Source
     stage : Stage
+    surfaces : Surfaces
+        What the chosen tree is shown as.
     panels : list of Panel
     tools : dict of str to Tool
         What the pointer can do, by name.
@@ -66,6 +68,7 @@ class App:
     def __init__(self, source: Source, panels: tuple[Callable[[App], Panel], ...] = ()) -> None:
         from forest.viewer.page import build_page
         from forest.viewer.panels import usual_panels
+        from forest.viewer.surfaces import Surfaces
 
         trame = import_trame()
         self.server = trame.get_server(f"forest-{id(self)}", client_type="vue3")
@@ -80,6 +83,7 @@ class App:
         self._in_detail: tuple[int, ...] = ()
         self._fresh_state()
         self.add_tool(PickTool(self.choose))
+        self.surfaces = Surfaces(self)
         self.panels: list[Panel] = [make(self) for make in (*panels, *usual_panels)]
         self.show_year()
         self.look("stand")

@@ -12,7 +12,6 @@ import numpy as np
 from forest.errors import InputError
 from forest.viewer.charts import line_chart
 from forest.viewer.colours import fates, species_label
-from forest.viewer.surfaces import Surfaces
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +52,6 @@ class TreeCard:
                 "disc_said": "",
             }
         )
-        self._surfaces = Surfaces(app)
         app.server.controller.trigger("find")(self._find)
         app.server.controller.trigger("disc")(self._cut)
 
@@ -85,7 +83,7 @@ class TreeCard:
                 color="primary",
                 id="alone",
             )
-            self._surfaces.build()
+            self._app.surfaces.build()
             html.Div(v_html=("card_html",), id="card")
             html.H3("Disc")
             with html.Div(classes="d-flex align-center"):
@@ -115,7 +113,7 @@ class TreeCard:
         """Write the card of the chosen tree in the year that is shown."""
         app = self._app
         app.state.disc_image, app.state.disc_said = "", ""
-        self._surfaces.refresh()
+        app.surfaces.refresh()
         if app.chosen is None:
             app.state.card_html = ""
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from forest.viewer.bark_tool import CrackTool
 from forest.viewer.branch_tools import BendTool, PruneTool
 from forest.viewer.brush_tool import BrushTool
 from forest.viewer.desk import Desk
@@ -14,7 +15,10 @@ from forest.viewer.work_panel import WorkPanel
 if TYPE_CHECKING:
     from forest.viewer.app import App
 
-_TOOLS = (FellTool, MarkTool, PruneTool, BendTool, PlantTool, ObstacleTool, BrushTool)
+_TOOLS = (
+    *(FellTool, MarkTool, PruneTool, BendTool, CrackTool),
+    *(PlantTool, ObstacleTool, BrushTool),
+)
 
 
 class LivePart:

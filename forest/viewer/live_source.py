@@ -21,11 +21,13 @@ if TYPE_CHECKING:
 
     from forest.dendro.disc import Disc
     from forest.live import LiveSession
+    from forest.record.run import Run
     from forest.scenario import Scenario
     from forest.stand import Stand
     from forest.surface.export import Part
     from forest.trees.skeleton import Skeleton
 
+_SHAPING = ("prune", "bend", "obstacle", "crack")  # acts that change a tree's surface
 _MOST_METAMERS = 60_000  # of all trees that are shown with their branches
 _MOST_NEAR = 24  # trees that were looked at last, where not all can be shown with branches
 
@@ -179,6 +181,12 @@ class LiveSource:
 
     def disc(self, tree_id: int, height_m: float, year: int) -> Disc:
         """A disc, cut as out of the session's run file."""
+        with self._run() as run:
+            return run.disc(tree_id, height_m, year=year)
+
+    @contextmanager
+    def _run(self) -> Iterator[Run]:
+        """Give the session as a run file, written anew after each year."""
         from forest.record.run import open_run
 
         with self.at_rest() as session:
@@ -187,19 +195,41 @@ class LiveSource:
                 session.write_run(Path(folder.name) / "run.h5")
                 self._recorded = folder
             with open_run(Path(self._recorded.name) / "run.h5") as run:
-                return run.disc(tree_id, height_m, year=year)
+                yield run
 
     def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
-        """Surface of a living tree; its bark needs the rings of all its years, from a run file."""
-        from forest.viewer.surfaces import wood_parts
+        """Surface of a living tree; only a sample tree has the rings along which bark is torn.
+
+        Bark is that of the last year, with the cracks that wait.
+        """
+        from forest.surface.bark.cracks import Crack
+        from forest.viewer.surfaces import surface_parts, wood_parts
 
         if shape == "bark":
-            raise InputError(
-                "bark is grown along a run file's rings", expected="forest view RUN.h5"
-            )
+            waiting = [
+                Crack(year + 1, act["height_m"], act["azimuth_deg"])
+                for act in self.pending
+                if act["kind"] == "crack" and act["tree_id"] == tree_id
+            ]
+            with self._run() as run:
+                if tree_id not in run.samples:
+                    raise InputError(
+                        f"tree {tree_id} is no sample tree: no rings to tear its bark along",
+                        expected="one of output.sample_trees",
+                    )
+                return surface_parts(run, tree_id, year, shape, waiting)
         species = {kind.name: kind for kind in self.scenario.species_list}
         skeleton = self.skeleton(tree_id, year)
         return wood_parts(skeleton, species[skeleton.species], shape)
+
+    def waiting_for(self, tree_id: int) -> str:
+        """What waits to be done to its shape or bark."""
+        acts = [
+            act
+            for act in self.pending
+            if act["kind"] in _SHAPING and act.get("tree_id") in (None, tree_id)
+        ]
+        return repr(acts) if acts else ""
 
     def stand_near(self, year: int) -> Stand:
         """A copy of the stand as it is now."""

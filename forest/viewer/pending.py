@@ -20,6 +20,7 @@ _COLOURS = {
     "harvest": "#c2341f",
     "prune": "#d9822b",
     "bend": "#8a5fb0",
+    "crack": "#7a5a3a",
     "mark": "#2f6fb2",
     "plant": "#3f8f4f",
 }

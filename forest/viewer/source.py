@@ -121,6 +121,9 @@ class Source(Protocol):
         Called in a thread of its own.
         """
 
+    def waiting_for(self, tree_id: int) -> str:
+        """What waits to be done to a tree's shape or bark, as a text; "" for nothing."""
+
     def stand_near(self, year: int) -> Stand:
         """The stand with all its buds, as near to a year as it is known; InputError if it is not.
 
@@ -212,6 +215,10 @@ class RunSource:
         from forest.viewer.surfaces import surface_parts
 
         return surface_parts(self._run, tree_id, year, shape)
+
+    def waiting_for(self, tree_id: int) -> str:
+        """Nothing waits in a run."""
+        return ""
 
     def stand_near(self, year: int) -> Stand:
         """The stand of the checkpoint that is nearest to a year."""

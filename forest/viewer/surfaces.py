@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from forest.errors import InputError
 from forest.view.surface_picture import add_textured
+from forest.viewer.picking import Ray, Vector, first_triangle
 
 if TYPE_CHECKING:
     from forest.record.run import Run
     from forest.species import Species
+    from forest.surface.bark.cracks import Crack
     from forest.surface.export import Part
     from forest.trees.skeleton import Skeleton
     from forest.viewer.app import App
@@ -31,6 +34,13 @@ _MOST_KEPT = 12
 _ACROSS = 0.45  # of the light that a slope gets more or less
 
 
+class _Wanted(NamedTuple):
+    tree_id: int
+    year: int
+    shape: str
+    waiting: str  # acts that change it, and wait for the next year
+
+
 class Surfaces:
     """What the chosen tree is shown as; surfaces are made beside the page's work and kept.
 
@@ -41,9 +51,9 @@ class Surfaces:
 
     def __init__(self, app: App) -> None:
         self._app = app
-        self._kept: dict[tuple[int, int, str], list[Part]] = {}
-        self._making: tuple[int, int, str] | None = None
-        self._shown: tuple[int, int, str] | None = None
+        self._kept: dict[_Wanted, list[Part]] = {}
+        self._making: _Wanted | None = None
+        self._shown: _Wanted | None = None
         app.state.update(
             {
                 "shape": "branches",
@@ -94,7 +104,7 @@ class Surfaces:
             return
         known = chosen in app.source.with_branches(year)
         state.shape_why_not = "" if known else self._why_not(year)
-        wanted = (chosen, year, str(state.shape))
+        wanted = _Wanted(chosen, year, str(state.shape), app.source.waiting_for(chosen))
         if not known or state.shape not in _MADE:
             state.shape_said = ""
             self._put(None)
@@ -108,7 +118,7 @@ class Surfaces:
     def _why_not(self, year: int) -> str:
         return f"Its branches are not on record in {year}: only those of sample trees are."
 
-    def _put(self, wanted: tuple[int, int, str] | None) -> None:
+    def _put(self, wanted: _Wanted | None) -> None:
         """Let a surface stand in the scene, or none."""
         if wanted == self._shown:
             return
@@ -120,24 +130,36 @@ class Surfaces:
             return
         parts = [_unbumped(part) for part in self._kept[wanted]]
         stage.put("surface", lambda plotter: add_textured(plotter, parts))
-        stage.dress(wanted[0])
+        stage.dress(wanted.tree_id)
         count = sum(len(part.mesh.triangles) for part in parts)
-        self._app.state.shape_said = f"{SHAPES[wanted[2]][1]}: {count:,} triangles"
+        self._app.state.shape_said = f"{SHAPES[wanted.shape][1]}: {count:,} triangles"
 
-    def _make(self, wanted: tuple[int, int, str]) -> None:
+    def bark_at(self, ray: Ray) -> Vector | None:
+        """Give where a line of sight meets the bark that is shown, m; None if it meets none."""
+        if self._shown is None or self._shown.shape != "bark":
+            return None
+        met = [
+            first_triangle(part.mesh.points.astype(np.float32), part.mesh.triangles, ray)
+            for part in self._kept[self._shown]
+            if part.material.name.startswith("bark")
+        ]
+        near = [each[1] for each in met if each is not None]
+        return ray.at(min(near)) if near else None
+
+    def _make(self, wanted: _Wanted) -> None:
         if self._making is None:
             self._making = wanted
             asyncio.get_running_loop().create_task(self._made(wanted))
 
-    async def _made(self, wanted: tuple[int, int, str]) -> None:
+    async def _made(self, wanted: _Wanted) -> None:
         """Make a surface in a thread, then show what is wanted by then."""
         app, state = self._app, self._app.state
         with state:
             state.shape_busy = True
-            state.shape_said = f"making {SHAPES[wanted[2]][0].lower()} (seconds to a minute)"
+            state.shape_said = f"making {SHAPES[wanted.shape][0].lower()} (seconds to a minute)"
         said = ""
         try:
-            parts = await asyncio.to_thread(app.source.surface, *wanted)
+            parts = await asyncio.to_thread(app.source.surface, *wanted[:3])
             self._kept = dict([*self._kept.items(), (wanted, parts)][-_MOST_KEPT:])
         except InputError as error:
             said = str(error)
@@ -145,7 +167,7 @@ class Surfaces:
             self._making, state.shape_busy = None, False
             if said:
                 state.shape_said = said
-                if (app.chosen, app.year, state.shape) == wanted:
+                if (app.chosen, app.year, state.shape) == wanted[:3]:
                     state.shape = "branches"
             app.refresh()
             if said:
@@ -170,7 +192,9 @@ def _unbumped(part: Part) -> Part:
     return replace(part, material=painted)
 
 
-def surface_parts(run: Run, tree_id: int, year: int, shape: str) -> list[Part]:
+def surface_parts(
+    run: Run, tree_id: int, year: int, shape: str, waiting: Sequence[Crack] = ()
+) -> list[Part]:
     """Make a sample tree's surface, as `output.sample_trees.meshes` writes it.
 
     Parameters
@@ -179,6 +203,8 @@ def surface_parts(run: Run, tree_id: int, year: int, shape: str) -> list[Part]:
     tree_id, year : int
     shape : str
         "tubes", "blended" or "bark".
+    waiting : sequence of Crack, optional
+        Cracks of the bark that wait for the next year.
 
     Raises
     ------
@@ -199,7 +225,7 @@ def surface_parts(run: Run, tree_id: int, year: int, shape: str) -> list[Part]:
             f"tree {tree_id} has no bark that could be seen: it is {200.0 * thick:.1f} cm thick",
             expected=f"{200.0 * LEAST_RADIUS_M:g} cm or more",
         )
-    return [*barked_parts(run, skeleton, year, tubes(skeleton)), *parts[1:]]
+    return [*barked_parts(run, skeleton, year, tubes(skeleton), waiting=waiting), *parts[1:]]
 
 
 def wood_parts(skeleton: Skeleton, species: Species, shape: str) -> list[Part]:

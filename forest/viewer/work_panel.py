@@ -27,6 +27,9 @@ def words_of(act: dict[str, Any]) -> str:
         if act.get("metamer") is not None:
             said += f" at metamer {act['metamer']}"
         return said
+    if kind == "crack":
+        place = f"{act['height_m']:.2f} m, {act['azimuth_deg'] % 360:.0f}°"
+        return f"crack the bark of tree {named} at {place}"
     if kind == "plant" and act.get("x_m"):
         place = f"{act['x_m'][0]:.2f}, {act['y_m'][0]:.2f} m"
         return f"plant {act['species'][0].replace('_', ' ')} at {place}"

@@ -35,7 +35,8 @@ SETTINGS = (
 )
 KINDS = (
     *("step", "step", "step", "undo", "fell", "prune", "lift", "plant", "thin", "harvest"),
-    *("mark", "fell marked", "bend", "wall", "move", "remove", "stroke", "stroke of a branch"),
+    *("mark", "fell marked", "bend", "crack", "wall", "move", "remove"),
+    *("stroke", "stroke of a branch"),
 )
 
 
@@ -72,6 +73,8 @@ def shape(session: LiveSession, kind: str, draw: int, tree_id: int) -> None:
         session.act(kind="mark", tree_ids=[tree_id], mark="out")
     elif kind == "fell marked":
         session.act(kind="fell", marked="out")
+    elif kind == "crack":
+        session.act(kind="crack", tree_id=tree_id, height_m=draw % 8 / 10, azimuth_deg=draw % 360)
     elif kind == "wall":
         box = {"min_m": [x, y, draw % 7 / 10], "max_m": [x + 0.5, y + 2, 2]}
         session.act(kind="obstacle", add={"kind": "box", "name": f"wall {draw % 3}", **box})
@@ -129,6 +132,7 @@ def worked() -> LiveSession:
     session.act(kind="stroke", points_m=[[5, 5, 1]], radius_m=0.5)
     to = session.skeleton(3).end[1] + np.array([0.02, 0.01, 0.0])
     session.act(kind="bend", tree_id=3, metamer=1, to_m=to.tolist())
+    session.act(kind="crack", tree_id=3, height_m=0.1, azimuth_deg=40.0)
     session.step()
     session.act(
         kind="harvest", method="gap", gap={"kind": "circle", "x_m": 3, "y_m": 3, "radius_m": 2}
@@ -147,7 +151,7 @@ def test_its_run_file_is_the_headless_one(worked: LiveSession, tmp_path: Path) -
     assert live.complete
     assert live.scenario == run.scenario
     assert live.digest == run.digest
-    kinds = {"planted", "died", "felled", "pruned", "marked", "bent"}
+    kinds = {"planted", "died", "felled", "pruned", "marked", "bent", "cracked"}
     assert set(run.events.kind) >= kinds - {"died"}
     assert set(run.treatments.kind) == set(ACT_KINDS)
     tables = worked.tables

@@ -19,10 +19,10 @@ from forest.surface.bark.checks import (
     checked_weakness,
     girths_from_birth,
 )
-from forest.surface.bark.fracture import room_to_break, weigh_all
+from forest.surface.bark.fracture import room_to_break, settle, weigh_all
 from forest.surface.bark.material import Material, Physics
 from forest.surface.bark.propagation import begin_fracture, tear_all
-from forest.surface.bark.rings import Rings, copied, stretch_all, turn_of
+from forest.surface.bark.rings import Rings, copied, stretch_all, turn_of, x_of
 from forest.surface.bark.strips import (
     FRACTURE,
     Crossings,
@@ -104,8 +104,17 @@ class Bark(BarkView):
                 history.append(Snapshot(time, rings.girth.copy(), elements_of(rings)))
         return replace(_seen(self, rings, time), history=tuple(history), _pace=pace)
 
-    def trigger(self, strip: int, x: float) -> Bark:
+    def trigger(self, strip: int, x: float, gap_m: float = 0.0) -> Bark:
         """Tear the bark of a strip at x m around its girth, by hand; the fracture runs on.
+
+        Parameters
+        ----------
+        strip : int
+        x : float
+            m around the girth.
+        gap_m : float
+            How far it is forced open in its middle, m, beside what the strain opens; less towards
+            its ends, like an ellipse.
 
         Raises
         ------
@@ -138,7 +147,9 @@ class Bark(BarkView):
         rings.grip_right[:] = rings.left + rings.open
         where = (np.int64(strip), np.int64(record), place, self.time)
         crossings = self.geometry.crossings
-        begin_fracture(rings, physics, np.int64(self.seed), crossings, *where)
+        fracture = begin_fracture(rings, physics, np.int64(self.seed), crossings, *where)
+        if gap_m > 0.0 and fracture >= 0:
+            _force_open(rings, physics, int(fracture), gap_m)
         _keep_untorn(rings, self._rings)
         return _seen(self, rings, self.time)
 
@@ -203,6 +214,10 @@ class Bark(BarkView):
         """Turn m around the girth into parts of a turn from the seam (uneven where growth was)."""
         edges, girth = self._rings.edges[strip], self.strips.girth[strip]
         return np.array([turn_of(edges, girth, float(at)) for at in np.ravel(x)])
+
+    def around(self, strip: int, turn: float) -> float:
+        """Turn parts of a turn from the seam into m around the girth."""
+        return float(x_of(self._rings.edges[strip], turn))
 
 
 def grow_bark(
@@ -291,6 +306,19 @@ def _advance(
     order = np.argsort(-worst, kind="stable")
     crossings = bark.geometry.crossings
     tear_all(rings, physics, np.int64(bark.seed), crossings, order, time)
+
+
+def _force_open(rings: Rings, physics: Physics, fracture: int, gap_m: float) -> None:
+    """Give the tears of a fracture rest widths, an ellipse along it, and settle their strips."""
+    nodes = np.flatnonzero(rings.tear_fracture[: rings.totals[0]] == fracture)
+    nodes = nodes[np.argsort(rings.tear_strip[nodes], kind="stable")]
+    off = (np.arange(len(nodes)) + 0.5) / len(nodes) * 2.0 - 1.0
+    for node, gap in zip(nodes, gap_m * np.sqrt(1.0 - off**2), strict=True):
+        strip = int(rings.tear_strip[node])
+        begin = int(rings.base[strip])
+        here = rings.tear[begin : begin + int(rings.records[strip])]
+        rings.rest[begin + int(np.flatnonzero(here == node)[0])] = gap
+        settle(rings, physics, np.int64(strip))
 
 
 def _keep_untorn(rings: Rings, before: Rings) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from forest.errors import InputError
 from forest.record.wood import YearlyWood
 from forest.surface.bark.axes import LEAST_RADIUS_M, BarkedTree, lay_strips
+from forest.surface.bark.checks import girths_from_birth
+from forest.surface.bark.cracks import Crack, Trigger, torn, triggers_of
 from forest.surface.bark.dressing import Dress, Fold
 from forest.surface.bark.girth import (
     GirthHistory,
@@ -42,8 +45,11 @@ class _Stretch:
     """How the epidermis of each strip stretches: the tables that `grow_bark` follows.
 
     `first` ends with the girth now, or what of it was there before plates tore again; `again`
-    goes on from there. `before` rows precede the first time of the history.
+    goes on from there. `before` rows precede the first time of the history. `triggers` are what is
+    torn by hand on the way, in order.
     """
+
+    triggers: tuple[Trigger, ...] = ()
 
     def __init__(
         self, first: _Floats, again: _Floats | None, before: int, spread: _Floats | None
@@ -87,23 +93,56 @@ class _Stretch:
     def grown(self, tree: BarkedTree, material: Material, seed: int, row: int) -> Bark:
         """Grow bark up to a row of the history."""
         rows = self.before + row + 1
-        spread = None if self.spread is None else self.spread[: rows - 1]
-        bark = grow_bark(tree.geometry, self.first[:rows], material, seed, dilatation=spread)
+        first = girths_from_birth(self.first, len(tree.geometry.axis))
+        stops = self._stops(rows)
+        begin = stops[0][0] if stops else rows
+        spread = _steps(self.spread, 1, begin)
+        bark = grow_bark(tree.geometry, first[:begin], material, seed, dilatation=spread)
+        bark = self._follow(bark, first, begin, rows, stops)
         if self.again is None:
             return bark
         # Plates tear where the first fractures lie at the end, so that none of them moves.
         last = bark
-        if rows < len(self.first):
-            last = bark.grow(self.first[rows:], dilatation=_rest(self.spread, rows))
+        if rows < len(first):
+            later = self._stops(len(first))[len(stops) :]
+            last = self._follow(bark, first, rows, len(first), later)
         # They begin at the first row: nothing grows in the step up to it.
+        spread = _steps(self.spread, 1, rows)
         if spread is not None:
             spread = np.concatenate((np.ones((1, *spread.shape[1:])), spread))
-        torn = last.refracture(np.maximum(self.again[:rows], last.strips.girth), dilatation=spread)
-        return replace(torn, surface=bark)
+        again = last.refracture(np.maximum(self.again[:rows], last.strips.girth), dilatation=spread)
+        return replace(again, surface=bark)
+
+    def _stops(self, rows: int) -> list[tuple[int, Trigger]]:
+        """List what is torn by hand on the way to a row, each with the rows that precede it.
+
+        What is torn before the year that follows the last one on record is there at once.
+        """
+        stops = [(self.before + trigger.row, trigger) for trigger in self.triggers]
+        return [stop for stop in stops if stop[0] < rows or stop[0] == rows == len(self.first)]
+
+    def _follow(
+        self,
+        bark: Bark,
+        first: _Floats,
+        done: int,
+        rows: int,
+        stops: Sequence[tuple[int, Trigger]],
+    ) -> Bark:
+        """Let bark that has followed some rows follow those up to another, torn on the way."""
+        for stop, trigger in stops:
+            if stop > done:
+                bark = bark.grow(first[done:stop], dilatation=_steps(self.spread, done, stop))
+                done = stop
+            bark = torn(bark, trigger)
+        if rows > done:
+            bark = bark.grow(first[done:rows], dilatation=_steps(self.spread, done, rows))
+        return bark
 
 
-def _rest(spread: _Floats | None, rows: int) -> _Floats | None:
-    return None if spread is None else spread[rows - 1 :]
+def _steps(spread: _Floats | None, begin: int, end: int) -> _Floats | None:
+    """Give the dilatation of the steps that lead from a row to another."""
+    return None if spread is None else spread[begin - 1 : end - 1]
 
 
 def _rising(remains: _Floats, now: _Floats, before: int) -> _Floats:
@@ -269,6 +308,7 @@ def bark_tree(
     strip_m: float | None = None,
     least_radius_m: float = LEAST_RADIUS_M,
     years: int = 40,
+    cracks: Sequence[Crack] = (),
 ) -> TreeBark:
     """Grow bark on a whole tree.
 
@@ -303,6 +343,8 @@ def bark_tree(
         Thinner wood has no fractures.
     years : int
         How old a tree without a history is taken to be.
+    cracks : sequence of Crack, optional
+        Fractures that someone started (`forest.surface.bark.cracks.recorded_cracks` of a run).
 
     Returns
     -------
@@ -337,6 +379,7 @@ def bark_tree(
             history = supposed_girths(tree, years)
         of_law = _Stretch.conserved(history) if law == "conserved" else None
         stretch = of_law or _Stretch.by_preset(history, preset)
+    stretch.triggers = triggers_of(tree, history, cracks)
     if material is None:
         material = preset.material(float(np.nanmean(girth[tree.strips_of(tree.paths[0].axis)])))
     return _grown(tree, preset, seed, history, stretch, material, len(history.times) - 1)
