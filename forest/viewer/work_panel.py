@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from forest.errors import InputError
+from forest.errors import InputError, years_of
 from forest.viewer.desk import Desk
 
 if TYPE_CHECKING:
@@ -66,7 +67,9 @@ class WorkPanel:
             {
                 "live_acts": [],
                 "live_file": str(self._file),
-                "live_replay": f"forest run {self._file} --out {self._file.stem}.h5",
+                "live_replay": shlex.join(
+                    ["forest", "run", str(self._file), "--out", f"{self._file.stem}.h5"]
+                ),
                 "live_run_file": f"{self._file.stem}.h5",
                 "live_saved": "",
             }
@@ -203,7 +206,6 @@ class WorkPanel:
             if to.exists():
                 raise InputError("exists already", where=str(to), expected="a new name")
             session.write_run(to)
-            years = len(session.records)
-            self._desk.app.state.live_saved = f"{to} holds {years} years"
+            self._desk.app.state.live_saved = f"{to} holds {years_of(len(session.records))}"
 
         self._desk.app.tried(lambda: self._desk.do(write))
