@@ -295,7 +295,7 @@ class LiveSession:
             If no year is done, or the file cannot be written.
         """
         if not self._records:
-            raise InputError("no year is done", where="write_run", expected="a step before it")
+            raise InputError("no year is done", expected="a step before a run file")
         scenario = self._with([])
         write_run(scenario, self._records, Path(path), overwrite=overwrite, say=self._say)
 

@@ -203,9 +203,17 @@ class WorkPanel:
                 raise InputError(
                     f"{to.name} is no run file's name", expected="one that ends in .h5"
                 )
-            if to.exists():
+            if _is_there(to):
                 raise InputError("exists already", where=str(to), expected="a new name")
             session.write_run(to)
             self._desk.app.state.live_saved = f"{to} holds {years_of(len(session.records))}"
 
         self._desk.app.tried(lambda: self._desk.do(write))
+
+
+def _is_there(path: Path) -> bool:
+    """Tell whether there is such a file; refuse what no file can be called."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # too long, or with a null byte
+        raise InputError(f"{path.name[:40]!r} is no name that a file can have") from None
