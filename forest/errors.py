@@ -53,6 +53,11 @@ def span_of(first: int, last: int) -> str:
     return f"a year from {first} to {last}" if first != last else f"{first}, the only year"
 
 
+def years_of(count: int) -> str:
+    """Say how many years."""
+    return "1 year" if count == 1 else f"{count} years"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Give a hint that names the known word closest to `name`, or list the known words."""
     choices = sorted(known)

@@ -54,7 +54,7 @@ def run(
 
         forest run scenarios/mixed_stand.toml --out wet.h5 --set site.productivity=1.4 --seed 7
     """
-    from forest.errors import InputError
+    from forest.errors import InputError, years_of
 
     to = out or Path(f"{scenario.stem}.h5")
     if resume and force:
@@ -86,7 +86,7 @@ def run(
     with finished:
         if "stand" in finished.tables:
             print_stand_table(finished)
-        typer.echo(f"{finished.path} holds {len(finished.years)} years")
+        typer.echo(f"{finished.path} holds {years_of(len(finished.years))}")
 
 
 def sweep(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -77,7 +78,7 @@ def _view_run(file: Path, host: str, port: int, browser: bool) -> None:
 
 
 def _view_live(file: Path, session_file: Path, host: str, port: int, browser: bool) -> None:
-    from forest.errors import InputError
+    from forest.errors import InputError, years_of
     from forest.live import take_up
     from forest.scenario import Scenario
     from forest.viewer.app import App
@@ -92,8 +93,8 @@ def _view_live(file: Path, session_file: Path, host: str, port: int, browser: bo
     session = take_up(scenario, session_file, say=lambda line: typer.echo(line, err=True))
     part = LivePart()
     app = App(LiveSource(session, str(session_file)), panels=(part.panel,))
-    done = f", {len(session.records)} years grown" if session.records else ""
-    replay = f"forest run {session_file} --out {session_file.stem}.h5"
+    done = f", {years_of(len(session.records))} grown" if session.records else ""
+    replay = shlex.join(["forest", "run", str(session_file), "--out", f"{session_file.stem}.h5"])
     try:
         _serve(app, host, port, _ready(f"{file.name}{done}", browser))
     finally:

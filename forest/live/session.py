@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from forest.errors import ActError, InputError
+from forest.errors import ActError, InputError, OutputError
 from forest.live.preview import markers_to_come, preview
 from forest.live.records import tables_of, write_run
 from forest.management.plan import YearOfActs, plan_year
@@ -52,6 +52,8 @@ class LiveSession:
     ----------
     stand : Stand
         As it is after the last step.
+    kept : bool
+        Whether its file holds all that was done: not where a step's could not be written.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class LiveSession:
         self._base = scenario
         self._say = say
         self._save_to = None if save_to is None else Path(save_to)
+        self.kept = True
         self._acts: list[dict[str, Any]] = []
         self._pending: list[dict[str, Any]] = []
         self._records: list[YearRecord] = []
@@ -137,8 +140,7 @@ class LiveSession:
             self._become(before)
             number = len(self._base.acts) + len(self._acts) + len(self._pending)
             raise InputError(str(error).replace(f"acts[{number}]", "act", 1)) from None
-        self._pending = queued
-        self._keep()
+        self._wait(queued, before)
 
     def undo(self, number: int = -1) -> None:
         """Take back an act that waits for the next step.
@@ -166,8 +168,7 @@ class LiveSession:
         except InputError as error:
             self._become(before)
             raise InputError(f"a later act needs it: {error}", where="undo") from None
-        self._pending = left
-        self._keep()
+        self._wait(left, before)
 
     def step(self) -> YearRecord:
         """Do the acts that wait, grow a year and give its record.
@@ -177,6 +178,8 @@ class LiveSession:
         InputError
             If an act of the scenario that the session started from cannot be done in its year, or
             the climate ends; then the stand is as it was.
+        OutputError
+            If the year is grown, but its file cannot be written: `kept` is false until it can.
         """
         done = self._dated(self._pending)
         record = self.stand.step()
@@ -185,7 +188,7 @@ class LiveSession:
         self._records.append(record)
         self._tables = None
         self._become(self._with([]))
-        self._keep()
+        self.keep()
         return record
 
     # ------------------------------------------------------------------ what it is now
@@ -268,7 +271,20 @@ class LiveSession:
     def keep_in(self, path: str | Path) -> None:
         """Keep the session in a file from now on: written anew after each act and step."""
         self._save_to = Path(path)
-        self._keep()
+        self.keep()
+
+    def keep(self) -> None:
+        """Write the file in which the session is kept, if it is.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written; what was there before stays.
+        """
+        self.kept = False
+        if self._save_to is not None:
+            self.save(self._save_to)
+        self.kept = True
 
     def write_run(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a run file of the years so far, and what goes with it, as the headless run does.
@@ -279,7 +295,7 @@ class LiveSession:
             If no year is done, or the file cannot be written.
         """
         if not self._records:
-            raise InputError("no year is done", where="write_run", expected="a step before it")
+            raise InputError("no year is done", expected="a step before a run file")
         scenario = self._with([])
         write_run(scenario, self._records, Path(path), overwrite=overwrite, say=self._say)
 
@@ -309,6 +325,12 @@ class LiveSession:
         self.stand.scenario = scenario
         self._planned = False
 
-    def _keep(self) -> None:
-        if self._save_to is not None:
-            self.save(self._save_to)
+    def _wait(self, pending: list[dict[str, Any]], before: Scenario) -> None:
+        """Let these acts wait, if they can be kept; else those that waited before."""
+        were, self._pending = self._pending, pending
+        try:
+            self.keep()
+        except OutputError:
+            self._pending = were
+            self._become(before)
+            raise

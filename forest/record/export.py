@@ -173,6 +173,10 @@ def whole_file(to: str | Path, *, overwrite: bool) -> Iterator[Path]:
             draft.replace(to)
     except OSError as error:
         raise OutputError.of(error, to) from error
+    except OutputError as error:  # of the draft, whose name says nothing
+        if isinstance(error.__cause__, OSError):
+            raise OutputError.of(error.__cause__, to) from error.__cause__
+        raise
 
 
 @contextmanager

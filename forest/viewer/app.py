@@ -17,7 +17,7 @@ from forest.viewer.detail import trees_in_detail
 from forest.viewer.picking import Hit
 from forest.viewer.server import import_trame
 from forest.viewer.source import Source
-from forest.viewer.stage import Stage
+from forest.viewer.stage import GRID_M, Stage
 from forest.viewer.tools import PickTool, Tool
 
 _STILL_PX = 5.0  # a press and a release no further apart are a click
@@ -106,6 +106,9 @@ class App:
                     {"title": label, "value": name} for name, label in CHOICES.items()
                 ],
                 "legend": {},
+                "grid": f"grid {GRID_M:g} m"
+                if max(self.source.scenario.plot.size_m) > GRID_M
+                else "",
                 "chosen": None,
                 "branches": False,
                 "branches_known": False,
@@ -117,7 +120,8 @@ class App:
                 "tool_hint": "",
                 "tab": "stand",
                 "message": "",
-                "warned": False,
+                "warned": 0,
+                "heard": 0,
             }
         )
 
@@ -214,7 +218,7 @@ class App:
     def warn(self, message: str) -> None:
         """Tell the user in a line why something was not done."""
         self.state.message = message
-        self.state.warned = True
+        self.state.warned += 1
 
     # ------------------------------------------------------------------ what the page does
 

@@ -170,7 +170,7 @@ class BrushTool(BranchTool):
         """Make fields for the brush and its symmetry."""
         html.Div(
             "The scenario has no markers (environment.markers): a brush does nothing.",
-            classes="quiet",
+            classes="quiet mb-3",
             v_if=(str(not self._has_markers).lower(),),
         )
         number_field(v, "brush_radius", "Radius, m", min=_LEAST_M, step=0.05)

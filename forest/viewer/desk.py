@@ -88,7 +88,13 @@ class Desk:
         self.do(lambda session: session.undo(number))
 
     def finish(self) -> None:
-        """Do what still waits, when the page is closed for good."""
+        """Do what still waits, and keep it, when the page is closed for good.
+
+        Raises
+        ------
+        OutputError
+            If the session's file is behind, and still cannot be written.
+        """
         waiting, self._waiting = self._waiting, []
         with self.source.lock:
             for work in waiting:
@@ -96,6 +102,8 @@ class Desk:
                     work(self.source.session)
                 except InputError as error:
                     self.app.warn(str(error))
+            if not self.source.session.kept:
+                self.source.session.keep()
 
     # ------------------------------------------------------------------ years
 

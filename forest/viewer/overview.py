@@ -69,7 +69,9 @@ class StandPanel:
         parts = []
         for column, title, decimals in _CHARTS:
             value = float(now[column].iloc[0]) if len(now) else float("nan")
-            said = f"{value:.{decimals}f}" if np.isfinite(value) else "–"
+            small = 0.0 < value < 0.5 * 10.0**-decimals  # else it would be said to be none
+            said = f"{value:.{1 if small else decimals}{'g' if small else 'f'}}"
+            said = said if np.isfinite(value) else "–"
             chart = line_chart(years, {title: (whole[column], _INK)}, year, title)
             parts.append(f"<h3>{title} <span class='quiet'>{year}: {said}</span></h3>{chart}")
         shares = {}

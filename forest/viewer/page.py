@@ -86,7 +86,7 @@ def build_page(app: App) -> None:
             f'@keydown="{_KEYS}" tabindex="-1" @vue:mounted="(node) => node.el.focus()"'
         )
         client.Style(_STYLE)
-        _bar(v)
+        _bar(v, html)
         with v.VNavigationDrawer(
             location="right", width=392, permanent=True, border=0, elevation=1
         ):
@@ -94,11 +94,17 @@ def build_page(app: App) -> None:
         with v.VMain(style="height: 100vh;"), html.Div(classes="view", id="view"):
             _view(app, html)
         _years(v, html)
-        with v.VSnackbar(v_model=("warned",), timeout=7000, location="top"):
+        with v.VSnackbar(
+            model_value=("warned > heard",),
+            update_modelValue="heard = warned",
+            key=("warned",),  # each has its full time
+            timeout=7000,
+            location="top",
+        ):
             html.Span("{{ message }}", id="message")
 
 
-def _bar(v: Any) -> None:
+def _bar(v: Any, html: Any) -> None:
     with v.VAppBar(density="compact", flat=True, border="b"):
         v.VIcon("mdi-pine-tree", classes="ml-4 mr-2", color="primary")
         v.VAppBarTitle("{{ title }}")
@@ -107,7 +113,7 @@ def _bar(v: Any) -> None:
             mandatory=True,
             density="compact",
             v_if=("tool_list.length > 1",),
-            classes="mr-3",
+            classes="mr-3 flex-shrink-0",
         ):
             v.VBtn(
                 v_for="each in tool_list",
@@ -116,6 +122,7 @@ def _bar(v: Any) -> None:
                 icon=("each.icon",),
                 title=("each.label",),
                 size="small",
+                min_width=30,
             )
         v.VSelect(
             v_model=("colour_by",),
@@ -124,33 +131,37 @@ def _bar(v: Any) -> None:
             density="compact",
             variant="outlined",
             hide_details=True,
-            style="max-width: 200px;",
+            style="max-width: 200px; min-width: 130px;",
             classes="mr-3 mt-1",
             id="colour-by",
         )
-        v.VBtn(
-            icon="mdi-source-branch",
-            size="small",
-            title="Branches of the trees that have them on record",
-            disabled=("!branches_known",),
-            color=("branches ? 'primary' : undefined",),
-            click="branches = !branches",
-            id="branches",
-        )
+        # A button that is off shows no title of its own; what is around it does.
+        no_branches = "No tree has its branches on record in this year"
+        branches = "Branches of the trees that have them on record"
+        with html.Div(title=(f"branches_known ? '{branches}' : '{no_branches}'",)):
+            v.VBtn(
+                icon="mdi-source-branch",
+                size="small",
+                disabled=("!branches_known",),
+                color=("branches ? 'primary' : undefined",),
+                click="branches = !branches",
+                id="branches",
+            )
         for way, icon, title in (
             ("stand", "mdi-axis-arrow", "The whole stand"),
             ("side", "mdi-image-filter-hdr", "From the side"),
             ("above", "mdi-arrow-down-bold-box-outline", "From above"),
             ("tree", "mdi-target", "The chosen tree"),
         ):
-            v.VBtn(
-                icon=icon,
-                size="small",
-                title=title,
-                click=f"trigger('look', ['{way}'])",
-                id=f"look-{way}",
-                **({"disabled": ("chosen === null",)} if way == "tree" else {}),
-            )
+            none = "chosen === null" if way == "tree" else "false"
+            with html.Div(title=(f"{none} ? 'Choose a tree first' : '{title}'",)):
+                v.VBtn(
+                    icon=icon,
+                    size="small",
+                    click=f"trigger('look', ['{way}'])",
+                    id=f"look-{way}",
+                    disabled=(none,),
+                )
 
 
 def _view(app: App, html: Any) -> None:
@@ -189,7 +200,7 @@ def _view(app: App, html: Any) -> None:
         with html.Div(v_for="entry in legend.entries", key="entry.name"):
             html.Span(classes="swatch", style=("'background: ' + entry.colour",))
             html.Span("{{ entry.name }}")
-        html.Div("grid 10 m", style="color: #7c857e; margin-top: 3px;")
+        html.Div("{{ grid }}", v_if=("grid",), style="color: #7c857e; margin-top: 3px;")
 
 
 def _panels(app: App, v: Any, html: Any) -> None:
@@ -205,15 +216,16 @@ def _panels(app: App, v: Any, html: Any) -> None:
 
 def _years(v: Any, html: Any) -> None:
     with v.VFooter(app=True, border="t", height=62, classes="px-4"):
-        v.VBtn(
-            icon=("playing ? 'mdi-pause' : 'mdi-play'",),
-            variant="tonal",
-            size="small",
-            color="primary",
-            title="Play or pause (space)",
-            click="playing = !playing",
-            id="play",
-        )
+        with html.Div(title=("years.length < 2 ? 'There is one year' : 'Play or pause (space)'",)):
+            v.VBtn(
+                icon=("playing ? 'mdi-pause' : 'mdi-play'",),
+                variant="tonal",
+                size="small",
+                color="primary",
+                disabled=("years.length < 2",),
+                click="playing = !playing",
+                id="play",
+            )
         html.Div("{{ year }}", classes="year mx-3", id="year")
         v.VSlider(
             v_model=("step",),

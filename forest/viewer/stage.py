@@ -31,7 +31,7 @@ _GRID = (0.70, 0.68, 0.60)
 _CHOSEN = (0.98, 0.62, 0.10)
 _AMBIENT = 0.56  # share of a colour that is seen on the side away from the sun
 _POINTER_RAD = 0.004
-_GRID_M = 10.0
+GRID_M = 10.0
 
 # Corners of stems, of crowns, rings of crowns: for so many trees at most.
 _DETAIL = ((400, (10, 18, 8)), (1200, (6, 12, 5)), (10**9, (3, 7, 3)))
@@ -88,6 +88,8 @@ class Stage:
         self._dressed: int | None = None
         self._extras: dict[str, list[str]] = {}
         self._top = 1.0
+        self._looked: tuple[str, tuple[float, ...]] | None = None
+        self.window.AddObserver("WindowResizeEvent", lambda *_: self._look_again())
         self._lay_ground()
 
     @property
@@ -259,6 +261,12 @@ class Stage:
         width, depth = self.size_m
         corners = [(x, y, z) for x in (0.0, width) for y in (0.0, depth) for z in (0.0, self._top)]
         self._look(np.array(corners), bearing, above)
+        self._looked = way, tuple(self.plotter.camera.position)
+
+    def _look_again(self) -> None:
+        """Fit the whole stand into a picture of another size, if nobody has turned it since."""
+        if self._looked is not None and self._looked[1] == tuple(self.plotter.camera.position):
+            self.look(self._looked[0])
 
     def look_at_tree(self, tree_id: int) -> None:
         """Point the camera at one tree."""
@@ -294,8 +302,8 @@ class Stage:
             j_resolution=1,
         )
         self._add(ground, "ground", color=_GROUND)
-        ends = [((x, 0.0), (x, depth)) for x in (*np.arange(0.0, width, _GRID_M), width)] + [
-            ((0.0, y), (width, y)) for y in (*np.arange(0.0, depth, _GRID_M), depth)
+        ends = [((x, 0.0), (x, depth)) for x in (*np.arange(0.0, width, GRID_M), width)] + [
+            ((0.0, y), (width, y)) for y in (*np.arange(0.0, depth, GRID_M), depth)
         ]
         points = np.array([(*point, 0.0) for line in ends for point in line], np.float32)
         self._add(pv.line_segments_from_points(points), "grid", color=_GRID, line_width=1)

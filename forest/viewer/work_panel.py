@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from forest.errors import InputError
+from forest.errors import InputError, years_of
 from forest.viewer.desk import Desk
 
 if TYPE_CHECKING:
@@ -69,7 +70,9 @@ class WorkPanel:
             {
                 "live_acts": [],
                 "live_file": str(self._file),
-                "live_replay": f"forest run {self._file} --out {self._file.stem}.h5",
+                "live_replay": shlex.join(
+                    ["forest", "run", str(self._file), "--out", f"{self._file.stem}.h5"]
+                ),
                 "live_run_file": f"{self._file.stem}.h5",
                 "live_saved": "",
             }
@@ -203,10 +206,17 @@ class WorkPanel:
                 raise InputError(
                     f"{to.name} is no run file's name", expected="one that ends in .h5"
                 )
-            if to.exists():
+            if _is_there(to):
                 raise InputError("exists already", where=str(to), expected="a new name")
             session.write_run(to)
-            years = len(session.records)
-            self._desk.app.state.live_saved = f"{to} holds {years} years"
+            self._desk.app.state.live_saved = f"{to} holds {years_of(len(session.records))}"
 
         self._desk.app.tried(lambda: self._desk.do(write))
+
+
+def _is_there(path: Path) -> bool:
+    """Tell whether there is such a file; refuse what no file can be called."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # too long, or with a null byte
+        raise InputError(f"{path.name[:40]!r} is no name that a file can have") from None

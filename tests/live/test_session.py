@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -16,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pandas.testing import assert_frame_equal
 
-from forest.errors import ActError, InputError
+from forest.errors import ActError, InputError, OutputError
 from forest.live import LiveSession
 from forest.record.run import open_run
 from forest.record.schema import ACT_KINDS
@@ -277,3 +278,32 @@ def test_a_disk_that_refuses_loses_nothing(tmp_path: Path) -> None:
         session.save(tmp_path / "none" / "session.toml")
     assert (tmp_path / "session.toml").read_text() == before
     assert [path.name for path in tmp_path.iterdir()] == ["session.toml"]
+
+
+def test_what_cannot_be_kept_does_not_wait_and_a_year_is_kept_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "session.toml"
+    session = LiveSession(tiny(), save_to=file)
+    session.act(kind="fell", tree_ids=[2])
+    before = file.read_text()
+    full = pytest.raises(OutputError, match="no room left")
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "no room")
+
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "fsync", refuse)
+        with full:
+            session.act(kind="fell", tree_ids=[3])
+        with full:
+            session.undo()
+        assert [act["tree_ids"] for act in session.pending] == [[2]]
+        assert [act.kind for act in session.scenario.acts] == ["fell"]
+        with full:
+            session.step()
+        assert (session.year, session.pending, session.kept) == (2001, (), False)
+        assert file.read_text() == before
+    session.keep()
+    assert session.kept
+    assert Scenario.load(file) == session.scenario

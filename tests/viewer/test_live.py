@@ -275,6 +275,10 @@ def test_the_saved_run_equals_the_headless_run_of_the_session(
     wait_for_text(page, "#next-year", f"{_LAST + 4}")
     page.click("#pause")
     wait_for_text(page, "#next-year", "next:")
+    for name, why in (("a" * 300 + ".h5", "no name"), (str(kept.session), "no run file's name")):
+        page.fill("#run-file", name)
+        page.click("#save-run")
+        wait_for_text(page, "#message", why)
     page.fill("#run-file", "saved.h5")
     page.click("#save-run")
     wait_for_text(page, "#saved", "holds")

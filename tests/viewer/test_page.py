@@ -55,6 +55,14 @@ def test_it_loads_without_complaints_and_asks_no_one_else(page: Any) -> None:
     assert page.strangers == []
 
 
+def test_each_button_without_a_word_says_what_it_does(page: Any) -> None:
+    around = "node => (node.closest('[title]') || node).title"
+    assert page.locator("#look-tree").is_disabled()
+    assert page.locator("#look-tree").evaluate(around) == "Choose a tree first"
+    for name in ("branches", "look-stand", "look-side", "look-above", "play"):
+        assert len(page.locator(f"#{name}").evaluate(around)) > 5
+
+
 def test_the_slider_changes_year_and_picture(page: Any) -> None:
     before = still(page)
     _to_year(page, 2003)

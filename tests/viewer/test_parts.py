@@ -14,6 +14,7 @@ from forest.record.run import Run, open_run
 from forest.viewer.charts import line_chart, share_chart, ticks, year_at
 from forest.viewer.colours import CHOICES, colour_trees, fates, vigour
 from forest.viewer.source import RunSource
+from forest.viewer.stage import Stage
 
 
 @pytest.fixture
@@ -90,3 +91,23 @@ def test_vigour_is_the_ring_area_per_leaf_area(run: Run) -> None:
 def test_fates_are_what_events_say(run: Run) -> None:
     gone = run.events[run.events["kind"].astype(str).isin(("died", "felled", "windthrown"))]
     assert set(fates(RunSource(run))) == set(gone["tree_id"])
+
+
+def test_the_whole_stand_stays_in_a_picture_of_another_size() -> None:
+    stage = Stage((10.0, 10.0), [])
+    corners = np.array([(x, y, 0.0) for x in (0.0, 10.0) for y in (0.0, 10.0)])
+
+    def reach() -> float:
+        """Give how far from the middle corners lie, as a share of half the picture's width."""
+        camera, (width, height) = stage.plotter.camera, stage.plotter.window_size
+        matrix = camera.GetCompositeProjectionTransformMatrix(width / height, -1.0, 1.0)
+        seen = [matrix.MultiplyPoint((*corner, 1.0)) for corner in corners]
+        return max(abs(x / w) for x, _, _, w in seen)
+
+    stage.look("stand")
+    for size in ((1100, 720), (500, 700), (1600, 500)):
+        stage.plotter.window_size = size
+        assert reach() < 1.0
+    stage.plotter.camera.position = place = (5.0, -9.0, 4.0)  # turned by a user: let be
+    stage.plotter.window_size = (500, 700)
+    assert stage.plotter.camera.position == place

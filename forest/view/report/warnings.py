@@ -27,9 +27,8 @@ def warnings_of(run: Run) -> list[str]:
     if living == 0:
         found.append("No tree lives in the last year.")
     elif living < _FEW_TREES:
-        found.append(
-            f"Only {living} trees live in the last year: numbers per ha rest on few trees."
-        )
+        live = "1 tree lives" if living == 1 else f"{living} trees live"
+        found.append(f"Only {live} in the last year: numbers per ha rest on few trees.")
     width, depth = run.scenario.plot.size_m
     hectares = width * depth / 10_000.0
     if hectares < _SMALL_HA:
