@@ -27,6 +27,7 @@ environment = { shadow = {}, canopy = {} }
 planting = { kind = "random", density_ha = 2500 }
 species = { generic_deciduous = {} }
 """
+_BEND = "{kind='bend', year=2002, tree_id=1, metamer=1, to_m=[2, 2, 0.3]}"
 _VARIANTS = {
     "light, costs": [],
     "light, costs, obstacle, open": [
@@ -48,6 +49,13 @@ _VARIANTS = {
     "light, costs, stability": ["mechanics={bending=false}"],
     "light, costs, seedlings": ["regeneration={seed_rain={generic_deciduous=50}}"],
     "light and markers": ["environment={shadow={}, canopy={}, markers={}}"],
+    "bends": [f"acts=[{_BEND}]"],
+    "bends, mechanics": ["mechanics={wind_m_s=10, wind_growth=true}", f"acts=[{_BEND}]"],
+    "strokes": [
+        "environment={shadow={}, canopy={}, markers={}}",
+        "acts=[{kind='stroke', year=2001, points_m=[[1, 1, 0.1], [1, 1, 1]], radius_m=0.3, "
+        "markers_m3=500, tree_id=1, metamer=0}]",
+    ],
 }
 
 
