@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from forest.view.bodies_picture import AROUND
 from forest.view.looks import look_of
-from forest.view.tree_colours import FATE_COLOURS, SCALES, TreeColours
+from forest.view.tree_colours import FATE_COLOURS, SCALES, TreeColours, on_scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -147,11 +147,11 @@ class Overlay:
 
     @staticmethod
     def _add_scale(figure: Any, colours: TreeColours, points: float) -> None:
-        _, title, cmap = SCALES[colours.by]
+        scale = SCALES[colours.by]
         axes = figure.add_axes((_LEFT, 0.30, _WIDTH, 0.025))
-        steps = np.linspace(0.0, 1.0, 128)[None]
-        axes.imshow(steps, aspect="auto", cmap=cmap, extent=(0.0, colours.top, 0.0, 1.0))
+        steps = on_scale(np.linspace(0.0, 1.0, 128), scale.colours)[None]
+        axes.imshow(steps, aspect="auto", extent=(0.0, colours.top, 0.0, 1.0))
         axes.set_yticks([])
-        axes.set_title(title, loc="left", fontsize=0.9 * points, pad=3)
+        axes.set_title(scale.label, loc="left", fontsize=0.9 * points, pad=3)
         axes.tick_params(labelsize=0.8 * points, length=2, pad=2)
         axes.locator_params(axis="x", nbins=4)

@@ -15,12 +15,27 @@ if TYPE_CHECKING:
 
     from forest.record.run import Run
 
-#: What trees are coloured by: column of `/trees`, what a scale says, and its colours.
+
+class Scale(NamedTuple):
+    """A scale of colours from 0 up: column of `/trees`, title, unit, and name of its colours."""
+
+    column: str
+    title: str
+    unit: str
+    colours: str
+
+    @property
+    def label(self) -> str:
+        """Title and unit."""
+        return f"{self.title}, {self.unit}" if self.unit else self.title
+
+
+#: What trees are coloured by, in films and in the viewer.
 SCALES = {
-    "dbh": ("dbh_cm", "dbh, cm", "viridis"),
-    "height": ("height_m", "height, m", "viridis"),
-    "light": ("light", "relative light", "inferno"),
-    "age": ("age", "age, years", "cividis"),
+    "dbh": Scale("dbh_cm", "dbh", "cm", "viridis_r"),
+    "height": Scale("height_m", "Height", "m", "viridis_r"),
+    "light": Scale("light", "Relative light of the crown", "", "cividis"),
+    "age": Scale("age", "Age", "years", "YlOrBr"),
 }
 COLOURS = ("species", *SCALES)
 
@@ -30,7 +45,18 @@ FATE_COLOURS = {
     "felled": (0.84, 0.19, 0.15),
     "windthrown": (0.96, 0.55, 0.10),
 }
-_NOT_KNOWN = (0.75, 0.75, 0.75)
+_NOT_KNOWN = (0.72, 0.72, 0.69)
+_PALEST = 0.1  # of a map: what is paler does not stand out from the ground
+
+
+def on_scale(share: NDArray[np.float64], colours: str) -> NDArray[np.float64]:
+    """Give the colour (n, 3), 0 to 1, of each share, 0 to 1, of a scale; grey for NaN."""
+    from matplotlib import colormaps
+
+    at = _PALEST + (1.0 - _PALEST) * np.clip(share, 0.0, 1.0)
+    rgb = np.asarray(colormaps[colours](np.nan_to_num(at)), np.float64)[:, :3]
+    rgb[np.isnan(share)] = _NOT_KNOWN
+    return rgb
 
 
 class TreeColours(NamedTuple):
@@ -63,7 +89,7 @@ class TreeColours(NamedTuple):
             raise InputError(f"cannot colour by '{by}', {nearest(by, COLOURS)}")
         top = 1.0
         if by not in ("species", "light"):
-            column = SCALES[by][0]
+            column = SCALES[by].column
             values = run.read("trees", [column])[column].to_numpy(np.float64)
             top = float(np.nanmax(values)) if np.isfinite(values).any() else 1.0
         return cls(by, max(top, 1e-6), run.species_names)
@@ -74,16 +100,11 @@ class TreeColours(NamedTuple):
             names = trees["species"].astype(str)
             rgb = np.array([look_of(name).line for name in names], np.float64).reshape(-1, 3)
         else:
-            rgb = self._on_scale(trees[SCALES[self.by][0]].to_numpy(np.float64))
+            scale = SCALES[self.by]
+            values = trees[scale.column].to_numpy(np.float64)
+            rgb = on_scale(values / self.top, scale.colours)
         if "fate" in trees:
             fates = trees["fate"].to_numpy()
             for fate, colour in FATE_COLOURS.items():
                 rgb[fates == fate] = colour
         return rgb
-
-    def _on_scale(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        from matplotlib import colormaps
-
-        rgb = colormaps[SCALES[self.by][2]](np.clip(values / self.top, 0.0, 1.0))[:, :3]
-        rgb[np.isnan(values)] = _NOT_KNOWN
-        return np.asarray(rgb, np.float64)

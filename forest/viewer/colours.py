@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.view.looks import look_of
+from forest.view.stand_years import FATES
+from forest.view.tree_colours import SCALES, Scale, on_scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,14 +35,8 @@ CHOICES = {
     "age": "Age",
 }
 
-# Column or reckoned value, title, unit, colour map, decimals.
-_SCALES = {
-    "dbh": ("dbh_cm", "dbh", "cm", "viridis_r", 0),
-    "height": ("height_m", "Height", "m", "viridis_r", 0),
-    "light": ("light", "Relative light of the crown", "", "cividis", 1),
-    "vigour": ("vigour", "Basal area growth per leaf area", "cm²/m²", "YlGn", 1),
-    "age": ("age", "Age", "years", "YlOrBr", 0),
-}
+_SCALES = {**SCALES, "vigour": Scale("vigour", "Basal area growth per leaf area", "cm²/m²", "YlGn")}
+_DECIMALS = {"light": 1, "vigour": 1}
 
 _CAUSES = {
     "suppression": (0.35, 0.40, 0.60),
@@ -130,20 +126,15 @@ def colour_trees(source: Source, trees: pd.DataFrame, by: str) -> tuple[Colours,
         return _by_species(source, trees, dead)
     if by == "cause":
         return _by_cause(source, trees)
-    from matplotlib import colormaps
-
-    column, title, unit, name, decimals = _SCALES[by]
-    most = 1.0 if by == "light" else source.largest.get(column, 0.0) or 1.0
-    values = vigour(trees) if by == "vigour" else trees[column].to_numpy(np.float64)
-    palette = colormaps[name]
-    # The palest tenth of a map does not stand out from the ground.
-    at = 0.1 + 0.9 * np.clip(values / most, 0.0, 1.0)
-    colours = np.asarray(palette(np.nan_to_num(at)))[:, :3]
-    colours[np.isnan(values)] = _UNKNOWN
+    scale = _SCALES[by]
+    most = 1.0 if by == "light" else source.largest.get(scale.column, 0.0) or 1.0
+    values = vigour(trees) if by == "vigour" else trees[scale.column].to_numpy(np.float64)
+    colours = on_scale(values / most, scale.colours)
     colours[dead] = _DEAD
-    stops = (css(palette(0.1 + 0.9 * k / _STOPS)) for k in range(_STOPS + 1))
+    stops = map(css, on_scale(np.linspace(0.0, 1.0, _STOPS + 1), scale.colours))
     gradient = f"linear-gradient(to right, {', '.join(stops)})"
-    return colours, Legend(title, unit, _dead_entry(dead), ("0", f"{most:.{decimals}f}"), gradient)
+    ends = "0", f"{most:.{_DECIMALS.get(by, 0)}f}"
+    return colours, Legend(scale.title, scale.unit, _dead_entry(dead), ends, gradient)
 
 
 def vigour(trees: pd.DataFrame) -> NDArray[np.float64]:
@@ -162,7 +153,7 @@ def vigour(trees: pd.DataFrame) -> NDArray[np.float64]:
 def fates(source: Source) -> dict[int, str]:
     """Why each tree that is gone went, as far as the source knows: its id to the cause."""
     events = source.events
-    gone = events[events["kind"].astype(str).isin(("died", "felled", "windthrown"))]
+    gone = events[events["kind"].astype(str).isin(FATES)]
     causes = gone["cause"].astype(str)
     return dict(zip(gone["tree_id"].astype(int), causes, strict=True))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from forest.errors import InputError
+from forest.view.stand_years import COLUMNS as BODY_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,29 +24,15 @@ if TYPE_CHECKING:
 _CACHED_YEARS = 64
 #: Columns of a year's trees that are read for pictures and cards.
 COLUMNS = (
-    "tree_id",
-    "species",
-    "x_m",
-    "y_m",
-    "age",
-    "status",
-    "dbh_cm",
-    "base_diameter_cm",
-    "height_m",
-    "crown_base_m",
-    "crown_radius_m",
-    "lean_deg",
+    *BODY_COLUMNS,
     "basal_area_m2",
     "stem_volume_m3",
     "biomass_kg",
     "leaf_area_m2",
-    "light",
     "ring_width_mm",
     "metamers",
     "buds",
 )
-
-
 _SCALED = ("dbh_cm", "height_m", "age", "ring_width_mm", "leaf_area_m2")
 
 
