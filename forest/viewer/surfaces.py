@@ -54,6 +54,7 @@ class Surfaces:
         self._kept: dict[_Wanted, list[Part]] = {}
         self._making: _Wanted | None = None
         self._shown: _Wanted | None = None
+        self._refused: tuple[tuple[int, int], str] | None = None  # tree and year, and why
         app.state.update(
             {
                 "shape": "branches",
@@ -105,10 +106,13 @@ class Surfaces:
         known = chosen in app.source.with_branches(year)
         state.shape_why_not = "" if known else self._why_not(year)
         wanted = _Wanted(chosen, year, str(state.shape), app.source.waiting_for(chosen))
+        if self._refused and self._refused[0] != wanted[:2]:
+            self._refused = None
         if not known or state.shape not in _MADE:
-            state.shape_said = ""
+            state.shape_said = self._refused[1] if self._refused else ""
             self._put(None)
         elif wanted in self._kept:
+            self._refused = None
             self._put(wanted)
         else:
             self._put(None)
@@ -148,7 +152,7 @@ class Surfaces:
 
     def _make(self, wanted: _Wanted) -> None:
         if self._making is None:
-            self._making = wanted
+            self._making, self._refused = wanted, None
             asyncio.get_running_loop().create_task(self._made(wanted))
 
     async def _made(self, wanted: _Wanted) -> None:
@@ -157,21 +161,16 @@ class Surfaces:
         with state:
             state.shape_busy = True
             state.shape_said = f"making {SHAPES[wanted.shape][0].lower()} (seconds to a minute)"
-        said = ""
         try:
             parts = await asyncio.to_thread(app.source.surface, *wanted[:3])
             self._kept = dict([*self._kept.items(), (wanted, parts)][-_MOST_KEPT:])
         except InputError as error:
-            said = str(error)
+            self._refused = wanted[:2], str(error)
         with state:
             self._making, state.shape_busy = None, False
-            if said:
-                state.shape_said = said
-                if (app.chosen, app.year, state.shape) == wanted[:3]:
-                    state.shape = "branches"
+            if self._refused and (app.chosen, app.year, state.shape) == wanted[:3]:
+                state.shape = "branches"
             app.refresh()
-            if said:
-                state.shape_said = said
 
 
 def _unbumped(part: Part) -> Part:

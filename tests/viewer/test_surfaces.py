@@ -93,6 +93,8 @@ def test_the_card_shows_surfaces_and_says_why_not(viewing: Viewing, browser: Any
     changed(page, surface)
     page.click("#shape-bark")
     wait_for_text(page, "#shape-said", "no bark that could be seen")
+    page.wait_for_timeout(500)
+    assert "no bark that could be seen" in page.inner_text("#shape-said")  # and it stays
     page.fill("#find", str(_PLAIN))
     page.click("#find-button")
     wait_for_text(page, "#shape-said", "not on record")
