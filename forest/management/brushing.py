@@ -196,7 +196,7 @@ class Brush:
         free = outside(around.solid, points, around.voxel_m)
         around.markers.lay(points[free], (first + part[free]).astype(np.int32))
         stroke, hold = drawn.stroke, drawn.hold or Hold(_NO_TREE, 0)
-        end = len(around.markers.laid.due)
+        end = (self._records[-1].end if self._records else 0) + int(free.sum())
         record = _Record(first, stroke.steps, stroke.hold_steps, *hold, end)
         self._records.append(record)
         return number
