@@ -12,7 +12,7 @@ import typer
 from forest.cli.shared import RunFile, check_targets, given_options, options_named
 
 if TYPE_CHECKING:
-    from forest.view.movie import FilmSettings
+    from forest.view.film import FilmSettings
 
 _USUAL_FPS = {".mp4": 20.0, ".gif": 10.0}
 _STAND_SIZE, _TREE_SIZE = "960x600", "600x720"
@@ -150,7 +150,7 @@ def report(
 def _settings(to: Path, fps: float | None, seconds: float | None, size: str) -> FilmSettings:
     from forest.cli.viewing import pixels_of
     from forest.errors import InputError
-    from forest.view.movie import FilmSettings
+    from forest.view.film import FilmSettings
 
     fps = _USUAL_FPS[to.suffix.lower()] if fps is None else fps
     if not 0.5 <= fps <= 60.0:

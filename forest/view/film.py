@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,45 @@ _TICK_MS = 10  # a .gif counts in hundredths of a second
 
 Frame = NDArray[np.uint8]
 _Tell = Callable[[], object]
+
+
+MOST_FRAMES = 20_000
+
+
+@dataclass(frozen=True)
+class FilmSettings:
+    """How a film is made.
+
+    Attributes
+    ----------
+    fps : float
+        Frames per second.
+    seconds : float, optional
+        How long it lasts; by the number of years if not given.
+    size : (int, int)
+        Width and height, pixels.
+    """
+
+    fps: float = 20.0
+    seconds: float | None = None
+    size: tuple[int, int] = (960, 600)
+
+    def count(self, usual_seconds: float) -> int:
+        """Count the frames.
+
+        Raises
+        ------
+        InputError
+            If there would be more than `MOST_FRAMES`.
+        """
+        seconds = usual_seconds if self.seconds is None else self.seconds
+        frames = max(2, round(seconds * self.fps))
+        if frames > MOST_FRAMES:
+            raise InputError(
+                f"{seconds:g} s at {self.fps:g} frames per second are {frames:,} frames",
+                expected=f"{MOST_FRAMES:,} at most",
+            )
+        return frames
 
 
 def check_film(to: Path, size: tuple[int, int]) -> None:

@@ -124,15 +124,15 @@ class Leaves:
     along: NDArray[np.float64]
     colour: NDArray[np.float64]
     needles: NDArray[np.bool_]
-    blades: int = 1
+    blades: int
 
     @property
     def area(self) -> NDArray[np.float64]:
         """Area of all cards of a site, m2."""
-        return np.where(self.needles, _BRUSH_AREA, _LEAF_AREA) * self._shoot() ** 2
+        return np.asarray(np.where(self.needles, _BRUSH_AREA, _LEAF_AREA) * self._shoot() ** 2)
 
     def _shoot(self) -> NDArray[np.float64]:
-        return np.maximum(np.linalg.norm(self.along, axis=1), 1e-3)
+        return np.asarray(np.maximum(np.linalg.norm(self.along, axis=1), 1e-3))
 
     def cards(self, scale: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Give rhombic cards enlarged by `scale`: their corners (m, 4, 3), and the site of each.
@@ -220,7 +220,8 @@ def gather_leaves(skeletons: Sequence[Skeleton], most: int) -> tuple[Leaves, flo
             )
         )
     if not columns:
-        return Leaves(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool)), 1.0
+        none = np.empty((0, 3))
+        return Leaves(none, none, none, np.empty(0, bool), blades), 1.0
     place, along, colour, needle = (np.concatenate(column) for column in zip(*columns, strict=True))
     leaves = Leaves(place, along, colour, needle.astype(np.bool_), blades)
     return leaves, float(np.sqrt(total / max(len(place), 1)))

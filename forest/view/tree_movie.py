@@ -15,8 +15,7 @@ from forest.surface.blend import blended
 from forest.surface.tubes import tubes
 from forest.trees.leaves import leaves_of
 from forest.trees.skeleton import Skeleton
-from forest.view.film import check_film, write_film
-from forest.view.movie import FilmSettings
+from forest.view.film import FilmSettings, check_film, write_film
 from forest.view.overlay import font
 from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, shoot
 from forest.view.surface_picture import add_textured

@@ -311,7 +311,10 @@ def test_nothing_is_planted_in_an_obstacle() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        (("planting.trees=[{x_m=1, y_m=1}, {x_m=4, y_m=4}]",), r"planting.trees\[1\]: \(4, 4\) lies"),
+        (
+            ("planting.trees=[{x_m=1, y_m=1}, {x_m=4, y_m=4}]",),
+            r"planting.trees\[1\]: \(4, 4\) lies",
+        ),
         (
             ("acts=[{kind='plant', years=[2001, 2002], x_m=[2, 4], y_m=[2, 3.5]}]",),
             r"acts\[0\].x_m\[1\] in 2001: \(4, 3.5\) lies",
@@ -337,7 +340,9 @@ def test_nothing_is_planted_in_an_obstacle() -> None:
         (("acts=[{kind='plant', year=2001, pattern='regular', spacing_m=[1, 1]}]",), None),
     ],
 )
-def test_places_are_checked_before_anything_grows(changes: tuple[str, ...], said: str | None) -> None:
+def test_places_are_checked_before_anything_grows(
+    changes: tuple[str, ...], said: str | None
+) -> None:
     wall = "obstacles=[{kind='box', name='wall', min_m=[3, 3, 0], max_m=[5, 5, 2]}]"
     scenario = tiny(*ALONE, wall, "planting.trees=[{x_m=1, y_m=1}]", *changes)
     if said is None:

@@ -12,7 +12,8 @@ from PIL import Image, ImageSequence
 
 from forest.record.run import open_run
 from forest.view import film, tree_movie
-from forest.view.movie import FilmSettings, film_stand
+from forest.view.film import FilmSettings
+from forest.view.movie import film_stand
 from forest.view.stand_years import StandYears
 from forest.view.tree_colours import COLOURS, FATE_COLOURS, TreeColours
 from tests.tiny import YEARS, forest, write_tiny
