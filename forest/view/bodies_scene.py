@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 Colours = NDArray[np.float64]
 
 OBSTACLE = (0.56, 0.58, 0.61)
-_SUN, _SKY, _FLOOR = 0.62, 0.30, 0.24  # what of its colour a surface shows by each light
-_DEEP = 0.64  # brightness far below the canopy's top, of that at the top
+_SUN, _SKY, _FLOOR = 0.55, 0.27, 0.34  # what of its colour a surface shows by each light
+_DEEP = 0.66  # brightness far below the canopy's top, of that at the top
 _DEEP_SHARE = 0.35  # of the canopy's height: so far down the shade is 1 - 1/e of the deepest
 _CELL_M = 1.0
 _MOST_CELLS = 250_000
