@@ -101,6 +101,7 @@ def write_film(
     *,
     fps: float,
     overwrite: bool = False,
+    begin: Callable[[int], object] = lambda count: None,
     done: _Tell = lambda: None,
 ) -> None:
     """Render frames and write them as a film.
@@ -118,8 +119,8 @@ def write_film(
         Frames per second.
     overwrite : bool
         Whether to replace a file.
-    done : callable
-        Called after each frame.
+    begin, done : callable
+        Told the number of frames; called after each of them.
 
     Raises
     ------
@@ -129,6 +130,7 @@ def write_film(
         If it cannot be written. Nothing half-written is left behind.
     """
     to = Path(to)
+    begin(count)
     first = frame(0)
     check_film(to, (first.shape[1], first.shape[0]))
 

@@ -102,9 +102,10 @@ def film_stand(
         picture = stage.picture(trees, colours, k / count, obstacles)
         return overlay.beside(picture, moments[k])
 
-    begin(count)
     with stage:
-        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, done=done)
+        write_film(
+            frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done
+        )
     return count
 
 

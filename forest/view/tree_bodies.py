@@ -183,7 +183,8 @@ def _rounds(
     foot, shift : float64 (n, 2)
         Where the axis meets the ground, m; how far it moves aside, m per m of height.
     levels, radius : float64 (n, k)
-        Height and radius of each ring, from below; the first and the last ring are points.
+        Height and radius of each ring, from below; the first and the last ring are points. Rings
+        stand across the axis; what would lie below the ground lies on it.
     sides : int
         Corners of a ring.
     turned : float64 (n,)
@@ -195,9 +196,16 @@ def _rounds(
     axis = foot[:, None] + shift[:, None] * levels[:, :, None]
     per = 2 + (k - 2) * sides
     points = np.empty((n, per, 3), np.float32)
+    tilt = np.hypot(*shift.T)
+    cosine = 1.0 / np.sqrt(1.0 + tilt**2)
+    way = shift / np.maximum(tilt, 1e-12)[:, None]
+    along = np.einsum("nsi,ni->ns", around, way)
+    around = around + ((cosine - 1.0)[:, None] * along)[..., None] * way[:, None]
+    drop = (tilt * cosine)[:, None] * along
     inner = axis[:, 1:-1, None] + radius[:, 1:-1, None, None] * around[:, None]
     points[:, 2:, :2] = inner.reshape(n, per - 2, 2)
-    points[:, 2:, 2] = np.repeat(levels[:, 1:-1], sides, axis=1)
+    height = levels[:, 1:-1, None] - radius[:, 1:-1, None] * drop[:, None]
+    points[:, 2:, 2] = np.maximum(height, 0.0).reshape(n, per - 2)
     points[:, :2, :2], points[:, :2, 2] = axis[:, [0, -1]], levels[:, [0, -1]]
 
     side = np.arange(sides)

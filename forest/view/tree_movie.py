@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -109,11 +110,10 @@ def film_tree(
     def frame(k: int) -> NDArray[np.uint8]:
         return stage.picture(at[k], k / count)
 
-    begin(count)
-    try:
-        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, done=done)
-    finally:
-        stage.close()
+    with closing(stage):
+        write_film(
+            frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done
+        )
     return count
 
 
