@@ -103,9 +103,7 @@ def film_stand(
         return overlay.beside(picture, moments[k])
 
     with stage:
-        write_film(
-            frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done
-        )
+        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done)
     return count
 
 

@@ -111,9 +111,7 @@ def film_tree(
         return stage.picture(at[k], k / count)
 
     with closing(stage):
-        write_film(
-            frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done
-        )
+        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done)
     return count
 
 
