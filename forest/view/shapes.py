@@ -17,6 +17,8 @@ _GOLDEN = 0.6180339887498949
 _LEAF_LENGTH, _LEAF_AREA = 1.1, 0.495
 _BRUSH_LENGTH, _BRUSH_AREA = 2.2, 0.8  # length of a site's only blade; area of all of them
 _BLADES = (2, 14)  # least and most that stand for the needles of a site
+_TWIG = np.array([0.38, 0.29, 0.22])  # colour of the thinnest wood, whatever its species
+_OLD_M = 0.02  # radius from which wood has its species' bark
 _SHOOT = 0.8  # brightness of a shoot among its needles, of theirs
 _SLANT = np.radians(32.0)  # between shoot and needle
 
@@ -66,7 +68,8 @@ def gather_wood(skeletons: Sequence[Skeleton]) -> Wood:
             tree.axis[by_axis[1:]] == tree.axis[by_axis[:-1]]
         )
         look = look_of(tree.species)
-        bark = np.broadcast_to(look.bark, (len(by_axis), 3))
+        old = np.clip(tree.radius[by_axis, None] / _OLD_M, 0.0, 1.0)
+        bark = old * np.array(look.bark) + (1.0 - old) * _TWIG
         if look.needles:  # which hide the shoot that bears them
             bark = np.where(tree.leafy[by_axis, None], _SHOOT * np.array(look.leaf), bark)
         parts.append((tree.start[by_axis], tree.end[by_axis], tree.radius[by_axis], follows, bark))
