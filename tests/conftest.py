@@ -25,6 +25,12 @@ settings.register_profile("ci", settings.get_profile("here"), derandomize=True, 
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
 
+@pytest.fixture
+def three_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a test ask for up to three threads, on however few the other tests run."""
+    monkeypatch.setenv("FOREST_THREADS", "3")
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let the expectations of tests/golden be rewritten, for a reason that they keep."""
     parser.addoption(

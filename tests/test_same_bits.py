@@ -53,6 +53,7 @@ def test_run_twice(straight: Run, tmp_path: Path) -> None:
     assert not straight.rings.empty
 
 
+@pytest.mark.usefixtures("three_threads")
 def test_two_threads(straight: Run, tmp_path: Path) -> None:
     assert_same_runs(straight, simulate(tiny(), tmp_path / "run.h5", threads=2))
 
