@@ -167,7 +167,8 @@ class Stage:
             Of each of them, crown and stem, 0 to 1.
         obstacles : sequence of Obstacle
         """
-        self._top = max(self._top, float(np.nanmax(others["height_m"], initial=1.0)))
+        height = others["height_m"].to_numpy(np.float64)
+        self._top = float(np.nanmax(height, initial=self._top))
         self._others.show(others, crowns=self.crowns)
         self._others.paint(colours, colours)
         add_obstacles(self.plotter, obstacles)
