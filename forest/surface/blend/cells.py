@@ -20,7 +20,7 @@ from forest._threads import in_threads
 from forest.errors import InputError
 from forest.surface.blend.cones import Cones
 from forest.surface.blend.field import Blend, cone, value
-from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
+from forest.surface.blend.tree_of_boxes import first_leaf, held_by, next_leaf
 
 _Keys = NDArray[np.int64]
 
@@ -141,22 +141,13 @@ def check_memory(cones: Cones, cell_m: float, in_radius: float = CELLS_IN_RADIUS
 def _thinnest(field: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
     """Radius of the thinnest limb whose own surface may pass within `reach`; inf for none."""
     best = np.inf
-    node = np.int64(1)
-    leaves = field.boxes.leaves[0]
-    while node > 0:
-        if distance_to_box(field.boxes, node, x, y, z) > reach:
-            node = past(node)
-            continue
-        if node < leaves:
-            node *= 2
-            continue
-        first = (node - leaves) * PER_LEAF
-        for k in range(first, min(first + PER_LEAF, len(field.boxes.item))):
-            i = field.boxes.item[k]
-            away, radius, _, _, _, _ = cone(field.cones, i, x, y, z)
+    leaf = first_leaf(field.boxes, x, y, z, reach)
+    while leaf > 0:
+        for k in held_by(field.boxes, leaf):
+            away, radius, _, _, _, _ = cone(field.cones, field.boxes.item[k], x, y, z)
             if abs(away) <= reach:
                 best = min(best, radius)
-        node = past(node)
+        leaf = next_leaf(field.boxes, leaf, x, y, z, reach)
     return best
 
 

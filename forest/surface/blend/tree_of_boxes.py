@@ -64,7 +64,7 @@ def boxes_of(low: NDArray[np.float64], high: NDArray[np.float64]) -> Boxes:
 
 
 @njit
-def distance_to_box(boxes: Any, node: Any, x: Any, y: Any, z: Any) -> Any:
+def _distance(boxes: Any, node: Any, x: Any, y: Any, z: Any) -> Any:
     """Distance of a point from a node's box; 0 within, inf where the box is empty."""
     dx = max(boxes.low[node, 0] - x, 0.0, x - boxes.high[node, 0])
     dy = max(boxes.low[node, 1] - y, 0.0, y - boxes.high[node, 1])
@@ -73,8 +73,40 @@ def distance_to_box(boxes: Any, node: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 @njit
-def past(node: Any) -> Any:
+def _past(node: Any) -> Any:
     """Give the node to visit once one and all below it are done; 0 at the end."""
     while node & 1:
         node >>= 1
     return node + 1 if node > 0 else node
+
+
+@njit
+def first_leaf(boxes: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
+    """Give the first leaf whose box comes within reach of a point; 0 where there is none."""
+    return _leaf_from(boxes, np.int64(1), x, y, z, reach)
+
+
+@njit
+def next_leaf(boxes: Any, leaf: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
+    """Give the leaf within reach that follows one; 0 at the end. The reach may have changed."""
+    return _leaf_from(boxes, _past(leaf), x, y, z, reach)
+
+
+@njit
+def _leaf_from(boxes: Any, node: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
+    leaves = boxes.leaves[0]
+    while node > 0:
+        if _distance(boxes, node, x, y, z) > reach:
+            node = _past(node)
+        elif node < leaves:
+            node *= 2
+        else:
+            break
+    return node
+
+
+@njit
+def held_by(boxes: Any, leaf: Any) -> Any:
+    """Give the range of `boxes.item` that a leaf holds."""
+    first = (leaf - boxes.leaves[0]) * PER_LEAF
+    return range(first, min(first + PER_LEAF, len(boxes.item)))
