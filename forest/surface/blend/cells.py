@@ -20,7 +20,7 @@ from forest._threads import in_threads
 from forest.errors import InputError
 from forest.surface.blend.cones import Cones
 from forest.surface.blend.field import Blend, cone, value
-from forest.surface.blend.tree_of_boxes import first_leaf, held_by, next_leaf
+from forest.surface.blend.tree_of_boxes import visit
 
 _Keys = NDArray[np.int64]
 
@@ -141,13 +141,13 @@ def check_memory(cones: Cones, cell_m: float, in_radius: float = CELLS_IN_RADIUS
 def _thinnest(field: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
     """Radius of the thinnest limb whose own surface may pass within `reach`; inf for none."""
     best = np.inf
-    leaf = first_leaf(field.boxes, x, y, z, reach)
-    while leaf > 0:
-        for k in held_by(field.boxes, leaf):
+    node = np.int64(1)
+    while node > 0:
+        first, last, node = visit(field.boxes, node, x, y, z, reach)
+        for k in range(first, last):
             away, radius, _, _, _, _ = cone(field.cones, field.boxes.item[k], x, y, z)
             if abs(away) <= reach:
                 best = min(best, radius)
-        leaf = next_leaf(field.boxes, leaf, x, y, z, reach)
     return best
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from forest._jit import njit
 from forest.surface.blend.field import Blend, nearest
-from forest.surface.blend.tree_of_boxes import first_leaf, held_by, next_leaf
+from forest.surface.blend.tree_of_boxes import visit
 
 #: Meetings this near to one of the limbs' joints, in its reach, are part of the branching.
 _AT_JOINT = 1.0
@@ -53,9 +53,10 @@ def _cross(field: Any, starts: Any, listed: Any, pair: Any) -> Any:
         m = 0.5 * (cones.start[i] + cones.end[i])
         span = cones.end[i] - cones.start[i]
         reach = 0.5 * np.sqrt(np.sum(span * span)) + max(cones.low[i], cones.high[i])
-        leaf = first_leaf(boxes, m[0], m[1], m[2], reach)
-        while leaf > 0:
-            for k in held_by(boxes, leaf):
+        node = np.int64(1)
+        while node > 0:
+            first, last, node = visit(boxes, node, m[0], m[1], m[2], reach)
+            for k in range(first, last):
                 o = boxes.item[k]
                 if cones.axis[o] <= cones.axis[i]:
                     continue
@@ -78,7 +79,6 @@ def _cross(field: Any, starts: Any, listed: Any, pair: Any) -> Any:
                 if found < len(pair):
                     pair[found, 0], pair[found, 1] = cones.axis[i], cones.axis[o]
                 found += 1
-            leaf = next_leaf(boxes, leaf, m[0], m[1], m[2], reach)
     return found
 
 

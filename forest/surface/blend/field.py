@@ -20,7 +20,7 @@ from forest.mechanics.branch_points import fall_off
 from forest.surface.blend.cones import Cones
 from forest.surface.blend.joints import Joints
 from forest.surface.blend.limbs import Limbs
-from forest.surface.blend.tree_of_boxes import Boxes, boxes_of, first_leaf, held_by, next_leaf
+from forest.surface.blend.tree_of_boxes import Boxes, boxes_of, visit
 
 _Floats = NDArray[np.float64]
 
@@ -202,9 +202,10 @@ def _blend(field: Any, plain: Any, x: Any, y: Any, z: Any) -> Any:
     joints = field.joints
     best = plain
     moved = total = 0.0
-    leaf = first_leaf(field.places, x, y, z, 0.0)
-    while leaf > 0:
-        for k in held_by(field.places, leaf):
+    node = np.int64(1)
+    while node > 0:
+        first, last, node = visit(field.places, node, x, y, z, 0.0)
+        for k in range(first, last):
             place = field.places.item[k]
             here = np.inf
             for j in range(joints.place[place], joints.place[place + 1]):
@@ -214,7 +215,6 @@ def _blend(field: Any, plain: Any, x: Any, y: Any, z: Any) -> Any:
                     moved += share * (value - unblended)
                     total += share
             best = min(best, here)
-        leaf = next_leaf(field.places, leaf, x, y, z, 0.0)
     if field.printed[0]:
         return plain + moved / total if total > 0.0 else plain
     return best
@@ -225,15 +225,15 @@ def nearest(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
     """Least distance minus radius over all cones, and which it is; `hint` is tried first."""
     best = cone(field.cones, hint, x, y, z)[0]
     which = np.int64(hint)
-    leaf = first_leaf(field.boxes, x, y, z, max(best, 0.0))
-    while leaf > 0:
-        for k in held_by(field.boxes, leaf):
+    node = np.int64(1)
+    while node > 0:
+        first, last, node = visit(field.boxes, node, x, y, z, max(best, 0.0))
+        for k in range(first, last):
             i = field.boxes.item[k]
             value = cone(field.cones, i, x, y, z)[0]
             if value < best or (value == best and i < which):
                 best = value
                 which = i
-        leaf = next_leaf(field.boxes, leaf, x, y, z, max(best, 0.0))
     return best, which
 
 
