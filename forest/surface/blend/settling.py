@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from forest._jit import driver, njit
 from forest._threads import in_threads
-from forest.surface.blend.field import Blend, on_surface, slope
+from forest.surface.blend.field import Blend, cone, on_surface, slope, value
 
 _Floats = NDArray[np.float64]
 _CHUNKS = 64
@@ -26,6 +26,9 @@ _ROUNDS = 4
 _STEPS = 6
 #: Normals of a smooth surface turn less along an edge: the least cosine.
 _SMOOTH = 0.5
+#: A foot's points look down so far at least, and lie so near to the ground, m.
+_DOWN, _AT_GROUND = 0.9, 1e-6
+_RIM_STEPS = 4
 
 
 @driver
@@ -45,19 +48,62 @@ def _settle(
 
 
 @njit
+def _smooth(normals: Any, a: Any, b: Any, c: Any) -> Any:
+    """Whether the surface has no edge between the corners of a triangle."""
+    ab = bc = ca = 0.0
+    for k in range(3):
+        ab += normals[a, k] * normals[b, k]
+        bc += normals[b, k] * normals[c, k]
+        ca += normals[c, k] * normals[a, k]
+    return min(ab, bc, ca) > _SMOOTH
+
+
+@njit
+def _to_rim(field: Any, points: Any, normals: Any, triangles: Any, room: Any, hints: Any) -> None:
+    """Move points of a stem's foot that are next to its side onto the rim between the two.
+
+    Else triangles would cut the rim off. They are then points of the side.
+    """
+    cones = field.cones
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if min(normals[a, 2], normals[b, 2], normals[c, 2]) > -_DOWN:
+            continue
+        if _smooth(normals, a, b, c):
+            continue
+        for k in range(3):
+            i = triangles[t, k]
+            x, y, z = points[i, 0], points[i, 1], points[i, 2]
+            off = z - cones.ground[cones.axis[hints[i]]]
+            if normals[i, 2] > -_DOWN or not abs(off) < _AT_GROUND:
+                continue
+            nx = ny = 0.0
+            for _ in range(_RIM_STEPS):
+                _, r, fx, fy, fz, _ = cone(cones, hints[i], x, y, z)
+                nx, ny = x - fx, y - fy
+                d = np.sqrt(nx * nx + ny * ny + (z - fz) ** 2)
+                grown = r / max(d, 1e-12)
+                x, y = fx + grown * nx, fy + grown * ny
+            moved = np.sqrt((x - points[i, 0]) ** 2 + (y - points[i, 1]) ** 2)
+            if moved > 4.0 * room[i] or value(field, x, y, z + _AT_GROUND, hints[i])[0] < -1e-5:
+                continue  # other wood is there
+            points[i, 0], points[i, 1] = x, y
+            size = max(np.sqrt(nx * nx + ny * ny), 1e-12)
+            normals[i, 0], normals[i, 1], normals[i, 2] = nx / size, ny / size, 0.0
+
+
+@njit
 def _rises(points: Any, normals: Any, triangles: Any, rise: Any, area: Any) -> None:
     """Add up around each point what is missing under the surface (m3), and its area (m2)."""
     edge, before = np.empty((3, 3)), np.empty(3)
     for t in range(len(triangles)):
-        missing, smooth = 0.0, True
+        smooth = _smooth(normals, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+        missing = 0.0
         for c in range(3):
             i, j = triangles[t, c], triangles[t, (c + 1) % 3]
-            cosine = 0.0
             for k in range(3):
                 edge[c, k] = points[j, k] - points[i, k]
                 missing += (normals[j, k] - normals[i, k]) * edge[c, k]
-                cosine += normals[i, k] * normals[j, k]
-            smooth = smooth and cosine > _SMOOTH
         for k in range(3):
             m, n = (k + 1) % 3, (k + 2) % 3
             before[k] = 0.5 * (edge[0, m] * edge[1, n] - edge[0, n] * edge[1, m])
@@ -98,6 +144,7 @@ def settled(
     points = _even(points, triangles, room)
     normals = np.empty_like(points)
     in_threads(_settle, blend.kernel, points, room, np.int64(_STEPS), hints, normals)
+    _to_rim(blend.kernel, points, normals, triangles, room, hints)
     rise, area = np.zeros(len(points)), np.zeros(len(points))
     _rises(points, normals, triangles, rise, area)
     out = np.where(area > 0.0, rise / np.where(area > 0.0, area, 1.0), 0.0)
