@@ -94,7 +94,10 @@ def _to_rim(field: Any, points: Any, normals: Any, triangles: Any, room: Any, hi
 
 @njit
 def _rises(points: Any, normals: Any, triangles: Any, rise: Any, area: Any) -> None:
-    """Add up around each point what is missing under the surface (m3), and its area (m2)."""
+    """Add up around each point what is missing under the surface (m3), and its area (m2).
+
+    A triangle's area counts as a point sees it along its normal: that is what moving it adds.
+    """
     edge, before = np.empty((3, 3)), np.empty(3)
     for t in range(len(triangles)):
         smooth = _smooth(normals, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -107,13 +110,15 @@ def _rises(points: Any, normals: Any, triangles: Any, rise: Any, area: Any) -> N
         for k in range(3):
             m, n = (k + 1) % 3, (k + 2) % 3
             before[k] = 0.5 * (edge[0, m] * edge[1, n] - edge[0, n] * edge[1, m])
-        size = np.sqrt(before[0] ** 2 + before[1] ** 2 + before[2] ** 2)
         for c in range(3):
             i = triangles[t, c]
-            if smooth:
-                rise[i] += size * missing / 24.0
+            faced = 0.0
             for k in range(3):
-                area[i] += before[k] * normals[i, k]
+                faced += before[k] * normals[i, k]
+            faced = max(faced, 0.0)
+            area[i] += faced
+            if smooth:
+                rise[i] += faced * missing / 24.0
 
 
 def settled(
