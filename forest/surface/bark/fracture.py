@@ -129,9 +129,9 @@ def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
 
 @njit
 def worst_piece(rings: Any, physics: Any, s: Any) -> Any:
-    """Find the piece of a strip most beyond its threshold: its record, or -1."""
+    """Find the piece of a strip most beyond its threshold: its record (-1 for none) and load."""
     worst: Any = np.int64(-1)
-    most = 1.0 + 1e-9  # growth ratios carry rounding
+    most = 0.0
     floor = np.exp(-_MOST * physics.threshold_jitter)
     for i in range(rings.base[s], rings.base[s] + rings.records[s]):
         load = overload(rings, s, i)
@@ -143,7 +143,7 @@ def worst_piece(rings: Any, physics: Any, s: Any) -> Any:
         if load / rings.tough[i] > most:
             most = load / rings.tough[i]
             worst = i
-    return worst
+    return worst, most
 
 
 @njit

@@ -19,9 +19,9 @@ from forest.surface.bark.checks import (
     checked_weakness,
     girths_from_birth,
 )
+from forest.surface.bark.events import begin_fracture, tear_all
 from forest.surface.bark.fracture import room_to_break, settle, weigh_all
 from forest.surface.bark.material import Material, Physics
-from forest.surface.bark.propagation import begin_fracture, tear_all
 from forest.surface.bark.rings import Rings, copied, stretch_all, turn_of, x_of
 from forest.surface.bark.strips import (
     FRACTURE,
@@ -301,11 +301,8 @@ def _advance(
     girth = part.girth
     edges = _stretched(rings.edges, rings.girth, girth, spread)
     physics = Physics.of(bark.material, begins=part.number == 1, ends=part.number == substeps)
-    worst = np.zeros(len(girth))
-    in_threads(stretch_all, rings, physics, girth, edges, worst)
-    order = np.argsort(-worst, kind="stable")
-    crossings = bark.geometry.crossings
-    tear_all(rings, physics, np.int64(bark.seed), crossings, order, time)
+    in_threads(stretch_all, rings, physics, girth, edges)
+    tear_all(rings, physics, np.int64(bark.seed), bark.geometry.crossings, time)
 
 
 def _force_open(rings: Rings, physics: Physics, fracture: int, gap_m: float) -> None:
