@@ -76,8 +76,15 @@ def _next_strip(rings: Any, crossings: Any, s: Any, runs: Any, turn: Any) -> Any
 
 
 @njit
-def _mean_width(rings: Any, fracture: Any) -> Any:
-    return rings.area[fracture] / rings.reach[fracture]
+def _area(rings: Any, fracture: Any, moment: Any) -> Any:
+    """Area that a fracture has opened at a moment of the step, m2."""
+    kept = rings.kept[fracture]
+    return kept + moment * (rings.area[fracture] - kept)
+
+
+@njit
+def _mean_width(rings: Any, fracture: Any, moment: Any) -> Any:
+    return _area(rings, fracture, moment) / rings.reach[fracture]
 
 
 @njit
@@ -106,7 +113,9 @@ def _around(rings: Any, s: Any, x: Any) -> Any:
 
 
 @njit
-def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any) -> Any:
+def _bend(
+    rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any, moment: Any
+) -> Any:
     """By what part of a turn the course follows the edge of the nearest fracture (3.2.4).
 
     Lines of equal strain run along a fracture's edges. Its influence is all or nothing: within
@@ -116,7 +125,8 @@ def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any) -> Any:
     if j < 0 or side == 0:
         return 0.0
     node = np.int64(rings.tear[j])
-    if gap >= physics.influence * _mean_width(rings, np.int64(rings.tear_fracture[node])):
+    other = np.int64(rings.tear_fracture[node])
+    if gap >= physics.influence * _mean_width(rings, other, moment):
         return 0.0
     back = np.int64(rings.tear_down[node] if runs > 0 else rings.tear_up[node])
     if back < 0 or rings.tear_strip[back] != s:
@@ -158,28 +168,31 @@ def _end_of(rings: Any, fracture: Any, upper: Any) -> Any:
 
 
 @njit
-def _is_held(rings: Any, physics: Any, fracture: Any, upper: Any) -> Any:
+def _is_held(rings: Any, physics: Any, fracture: Any, upper: Any, moment: Any) -> Any:
     """Whether an end has run as far as it may in this step, or the Inglis ratio is too small."""
     reach = rings.reach[fracture]
     if reach < physics.flaw_m:
         return False
     ran = rings.ran[fracture, upper] > physics.run_m
-    return ran or not reach * reach > physics.inglis * rings.area[fracture]
+    return ran or not reach * reach > physics.inglis * _area(rings, fracture, moment)
 
 
 @njit
-def ahead_of(rings: Any, physics: Any, seed: Any, crossings: Any, fracture: Any, upper: Any) -> Any:
+def ahead_of(
+    rings: Any, physics: Any, seed: Any, crossings: Any, fracture: Any, upper: Any, moment: Any
+) -> Any:
     """Find where an end of a fracture would run on, and how strongly it is drawn there.
 
     It can while its length over its width exceeds the Inglis threshold, and the next strip bears
-    at least the `arrest` share of what would break it unaided.
+    at least the `arrest` share of what would break it unaided. `moment` says how much of the
+    step's strain is there: fractures are so wide by then.
 
     Returns the load (1 where it just runs, 0 where it is stopped, infinite for a flaw), record and
     strip, place on the epidermis, and which way it goes on from there.
     """
     node, runs = _end_of(rings, fracture, upper)
     none = (0.0, np.int64(-1), np.int64(-1), 0.0, runs)
-    if _is_held(rings, physics, fracture, upper):
+    if _is_held(rings, physics, fracture, upper, moment):
         return none
     s = np.int64(rings.tear_strip[node])
     i = _record_of(rings, node)
@@ -190,14 +203,14 @@ def ahead_of(rings: Any, physics: Any, seed: Any, crossings: Any, fracture: Any,
         return none
     if rings.axis[to] == rings.axis[s]:
         straight = x_of(rings.edges[to], turn)
-        turn += _bend(rings, physics, s, to, runs, straight)
+        turn += _bend(rings, physics, s, to, runs, straight, moment)
         run = 0.5 * (rings.width[to] + rings.width[s])
         turn += _stray(rings, physics, seed, fracture, to) * run / rings.girth[to]
     x = x_of(rings.edges[to], turn)
     near, side, gap = _around(rings, to, x)
     if near >= 0:
         other = np.int64(rings.tear_fracture[rings.tear[near]])
-        if side == 0 or gap < physics.stand_off * _mean_width(rings, other):
+        if side == 0 or gap < physics.stand_off * _mean_width(rings, other, moment):
             return none
     k, x = _piece_at(rings, to, x)
     part = (x - rings.left[k] - rings.open[k]) / rings.piece[k]

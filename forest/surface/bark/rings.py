@@ -19,7 +19,7 @@ CHUNKS = 64  # of strips; fixed, so that results do not depend on the number of 
 
 
 class Rings(NamedTuple):
-    """Strips, records (76 bytes), tears (32) and fractures (44) as columns that kernels change."""
+    """Strips, records (76 bytes), tears (32) and fractures (52) as columns that kernels change."""
 
     # one row per strip
     axis: NDArray[np.int32]
@@ -65,6 +65,7 @@ class Rings(NamedTuple):
     last: NDArray[np.int32]
     reach: NDArray[np.float64]  # length along the axis, m
     area: NDArray[np.float64]  # m2
+    kept: NDArray[np.float64]  # of which was open at the start of the step
     ran: NDArray[np.float64]  # (fractures, 2) by which the ends ran on in this step, m
     totals: NDArray[np.int64]  # (2) tears, fractures
 
