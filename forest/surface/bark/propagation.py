@@ -8,7 +8,7 @@ import numpy as np
 
 from forest._jit import njit
 from forest.random import STREAM_BARK, uniforms
-from forest.surface.bark.fracture import contrast, nearest_fracture, settle, tear
+from forest.surface.bark.fracture import bears_at, nearest_fracture, settle, tear
 from forest.surface.bark.rings import overload, rest_of, turn_of, x_of
 
 _UP = np.int64(1)
@@ -223,8 +223,7 @@ def ahead_of(
                 return none
     load = np.inf
     if rings.reach[fracture] >= physics.flaw_m and physics.arrest > 0.0:
-        grain = rings.cell[to] + np.int64(place / physics.grain_m)
-        needed = physics.arrest * contrast(rings, physics, min(grain, rings.cell[to + 1] - 1))
+        needed = physics.arrest * bears_at(rings, physics, to, k, place)
         load = overload(rings, to, k) / needed
     return load, k, to, place, goes
 
