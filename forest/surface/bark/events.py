@@ -56,7 +56,8 @@ def _yield_all(
     """Let events happen until nothing yields any more, the most loaded first.
 
     The queue holds (- load, what): 2 f + upper for an end of fracture f, - 1 - s for the next
-    fracture of strip s. Loads in it may be too high, since events only relieve: each is found
+    fracture of strip s. Loads in it may be too high, since events relieve (but for an end whose
+    bark slides until it faces a weaker piece, which then waits a little too long): each is found
     anew when it is due, and waits again if another is then more loaded. What bears its load n times
     over yielded when 1 / n of the strain was there: that is the moment.
     """
