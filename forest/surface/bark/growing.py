@@ -50,7 +50,7 @@ class Snapshot(NamedTuple):
 class Bark(BarkView):
     """Bark at one time. Its verbs give another bark; this one stays as it is.
 
-    Memory: 49 bytes an element (two to a fracture), and inside 136 bytes a possible fracture (one
+    Memory: 49 bytes an element (two to a fracture), and inside 160 bytes a possible fracture (one
     to each `least_piece_m` of epidermis) and 12 a grain.
     """
 
@@ -76,7 +76,8 @@ class Bark(BarkView):
         dilatation : float64 (strips, sectors) or (steps, strips, sectors), optional
             How fast each sector around the girth stretches, relative to the others (from the seam).
         substeps : int
-            Into how many parts of equal ratio each step is cut.
+            Into how many parts of equal ratio the loading of each step is cut; one is enough, since
+            what is loaded most yields first (`forest.surface.bark.events`).
         keep : bool
             Keep a snapshot of every step in `history`.
 

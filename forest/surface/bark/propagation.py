@@ -113,9 +113,7 @@ def _around(rings: Any, s: Any, x: Any) -> Any:
 
 
 @njit
-def _bend(
-    rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any, moment: Any
-) -> Any:
+def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any, moment: Any) -> Any:
     """By what part of a turn the course follows the edge of the nearest fracture (3.2.4).
 
     Lines of equal strain run along a fracture's edges. Its influence is all or nothing: within

@@ -217,17 +217,13 @@ def overload(rings: Any, s: Any, i: Any) -> Any:
 
 
 @njit
-def _stretch_chunk(
-    rings: Any, physics: Any, girth: Any, edges: Any, lo: Any, hi: Any
-) -> None:
+def _stretch_chunk(rings: Any, physics: Any, girth: Any, edges: Any, lo: Any, hi: Any) -> None:
     for s in range(lo, hi):
         _stretch(rings, physics, girth, edges, s)
 
 
 @driver
-def stretch_all(
-    first: Any, step: Any, rings: Any, physics: Any, girth: Any, edges: Any
-) -> None:
+def stretch_all(first: Any, step: Any, rings: Any, physics: Any, girth: Any, edges: Any) -> None:
     """Let the substrate grow below all strips."""
     n = len(girth)
     for chunk in range(first, CHUNKS, step):

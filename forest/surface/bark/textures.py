@@ -161,7 +161,8 @@ def _eye(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
     """Give how far from an eye's lines points are: a ringed oval, and brows that fall from it."""
     oval = np.abs(np.hypot(x / 0.35, (y + 0.35) / 0.5) - 0.8) / 0.45
     brow = np.abs(y - 0.75 + 1.3 * np.abs(x) ** 1.3) / 0.22
-    return np.minimum(oval, np.maximum(brow, np.abs(x) / 0.95))
+    away: NDArray[Any] = np.minimum(oval, np.maximum(brow, np.abs(x) / 0.95))
+    return away
 
 
 #: How far points are from a mark's middle, or its lines, in shares of its size: 1 at its edge.
