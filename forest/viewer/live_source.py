@@ -23,7 +23,7 @@ from forest.view.standing import (
 from forest.viewer.source import COLUMNS, largest_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     import pandas as pd
     from numpy.typing import NDArray
@@ -226,7 +226,9 @@ class LiveSource:
             with open_run(Path(self._recorded.name) / "run.h5") as run:
                 yield run
 
-    def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
+    def surface(
+        self, tree_id: int, year: int, shape: str, say: Callable[[str], None] = lambda line: None
+    ) -> list[Part]:
         """Surface of a living tree; only a sample tree has the rings along which bark is torn.
 
         Bark is that of the last year, with the cracks that wait.
@@ -246,7 +248,7 @@ class LiveSource:
                         f"tree {tree_id} is no sample tree: no rings to tear its bark along",
                         expected="one of output.sample_trees",
                     )
-                return surface_parts(run, tree_id, year, shape, waiting)
+                return surface_parts(run, tree_id, year, shape, waiting, say)
         species = {kind.name: kind for kind in self.scenario.species_list}
         skeleton = self.skeleton(tree_id, year)
         return wood_parts(skeleton, species[skeleton.species], shape)
