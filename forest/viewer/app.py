@@ -15,6 +15,7 @@ from forest.errors import InputError
 from forest.viewer.colours import CHOICES, colour_trees
 from forest.viewer.detail import trees_in_detail
 from forest.viewer.picking import Hit
+from forest.viewer.picture import Picture
 from forest.viewer.server import import_trame
 from forest.viewer.source import Source
 from forest.viewer.stage import GRID_M, Stage
@@ -76,6 +77,7 @@ class App:
         self.source = source
         conifers = [kind.name for kind in source.scenario.species_list if kind.group == "conifer"]
         self.stage = Stage(source.scenario.plot.size_m, conifers)
+        self._picture = Picture(self)
         self.tools: dict[str, Tool] = {}
         self._pressed: tuple[float, float, Hit] | None = None
         self._wanted: dict[str, Callable[[], None]] = {}
@@ -314,8 +316,9 @@ class App:
     ) -> None:
         """Take a press, move or release of the pointer, at pixels of a view of this size."""
         tool = self._tool
+        place = self._picture.place(across, down, width, height)
         if kind == "down":
-            hit = self.stage.hit(across / width, down / height, pressure)
+            hit = self.stage.hit(*place, pressure)
             self._pressed = (across, down, hit)
             if tool.drags:
                 self.tried(lambda: tool.drag(hit, hit, done=False))
@@ -329,5 +332,5 @@ class App:
         if kind == "up" and still:
             self.tried(lambda: tool.click(start))
         elif tool.drags:
-            now = self.stage.hit(across / width, down / height, pressure)
+            now = self.stage.hit(*place, pressure)
             self.tried(lambda: tool.drag(start, now, done=kind == "up"))

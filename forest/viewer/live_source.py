@@ -165,6 +165,11 @@ class LiveSource:
 
     # ------------------------------------------------------------------ what needs the stand
 
+    def close(self) -> None:
+        """Remove what was written for the viewer alone."""
+        if self._recorded is not None:
+            self._recorded.cleanup()
+
     @contextmanager
     def at_rest(self) -> Iterator[LiveSession]:
         """Give the session if no year grows.

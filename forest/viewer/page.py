@@ -37,6 +37,7 @@ body { font-family: Roboto, "Helvetica Neue", Arial, sans-serif; color: #2f3a33;
 .ends { display: flex; justify-content: space-between; width: 200px; }
 .hint { position: absolute; left: 14px; top: 10px; font-size: 12.5px; color: #4a564e;
   background: rgba(255,255,255,.75); border-radius: 6px; padding: 3px 9px; pointer-events: none; }
+#picture img { object-fit: contain; }
 .draws { cursor: crosshair; touch-action: none; }
 .year { font-size: 22px; font-weight: 500; min-width: 64px; text-align: center;
   font-variant-numeric: tabular-nums; }
@@ -174,6 +175,8 @@ def _view(app: App, html: Any) -> None:
             f'@pointermove.capture="tool_drags && ($event.buttons & 1) && !$event.altKey '
             f'&& ($event.stopPropagation(), {_pointer("move")})"',
             f'@pointerup.capture="{_OURS} && {_pointer("up")}"',
+            "@pointerenter=\"trigger('entered', "
+            '[$event.currentTarget.clientWidth, $event.currentTarget.clientHeight])"',
             '@wheel.capture="tool_wheels && ($event.preventDefault(), $event.stopPropagation(), '
             "trigger('wheel', [$event.deltaY]))\"",
             ":class=\"tool_drags ? 'draws' : ''\"",

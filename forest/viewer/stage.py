@@ -66,7 +66,6 @@ class Stage:
         self.size_m = size_m
         self._conifers = frozenset(conifers)
         self.plotter = pv.Plotter(off_screen=True, window_size=_WINDOW, lighting="none")
-        self.plotter.render_window.SetMultiSamples(0)
         self.plotter.set_background(_SKY[0], top=_SKY[1])
         self.plotter.enable_terrain_style(mouse_wheel_zooms=True)
         for towards, strength in ((SUN, 0.85), (SUN * (-1.0, -1.0, 0.6), 0.4)):
