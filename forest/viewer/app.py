@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from forest.errors import InputError
 from forest.viewer.colours import CHOICES, colour_trees
 from forest.viewer.detail import trees_in_detail
+from forest.viewer.fields import choices
 from forest.viewer.picking import Hit
 from forest.viewer.picture import Picture
 from forest.viewer.server import import_trame
@@ -104,9 +105,7 @@ class App:
                 "playing": False,
                 "speed": 2,
                 "colour_by": "species",
-                "colour_choices": [
-                    {"title": label, "value": name} for name, label in CHOICES.items()
-                ],
+                "colour_choices": choices(CHOICES),
                 "legend": {},
                 "grid": f"grid {GRID_M:g} m"
                 if max(self.source.scenario.plot.size_m) > GRID_M

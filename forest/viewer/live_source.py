@@ -191,16 +191,20 @@ class LiveSource:
 
     @contextmanager
     def _run(self) -> Iterator[Run]:
-        """Give the session as a run file, written anew after each year."""
+        """Give the session as a run file, written anew after each year.
+
+        A year may grow as it is read.
+        """
         from forest.record.run import open_run
 
         with self.at_rest() as session:
-            if self._recorded is None:
+            folder = self._recorded
+            if folder is None:
                 folder = tempfile.TemporaryDirectory(prefix="forest-view-")
                 session.write_run(Path(folder.name) / "run.h5")
                 self._recorded = folder
-            with open_run(Path(self._recorded.name) / "run.h5") as run:
-                yield run
+        with open_run(Path(folder.name) / "run.h5") as run:
+            yield run
 
     def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
         """Surface of a living tree; only a sample tree has the rings along which bark is torn.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from forest.viewer.fields import choice_field
+
 if TYPE_CHECKING:
     from forest.viewer.app import App
 
@@ -125,16 +127,13 @@ def _bar(v: Any, html: Any) -> None:
                 size="small",
                 min_width=30,
             )
-        v.VSelect(
-            v_model=("colour_by",),
-            items=("colour_choices",),
-            label="Colour by",
-            density="compact",
-            variant="outlined",
-            hide_details=True,
+        choice_field(
+            v,
+            "colour_by",
+            "Colour by",
+            ("colour_choices",),
             style="max-width: 200px; min-width: 130px;",
             classes="mr-3 mt-1",
-            id="colour-by",
         )
         # A button that is off shows no title of its own; what is around it does.
         no_branches = "No tree has its branches on record in this year"
@@ -244,13 +243,5 @@ def _years(v: Any, html: Any) -> None:
         html.Div(
             "{{ years[0] }} – {{ years[years.length - 1] }}", classes="quiet mx-3 text-caption"
         )
-        v.VSelect(
-            v_model=("speed",),
-            items=("[1, 2, 5, 10]",),
-            label="Years/s",
-            density="compact",
-            variant="outlined",
-            hide_details=True,
-            style="max-width: 92px;",
-            classes="mt-1",
-        )
+        speeds = ("[1, 2, 5, 10]",)
+        choice_field(v, "speed", "Years/s", speeds, style="max-width: 92px;", classes="mt-1")

@@ -53,9 +53,7 @@ class Picture:
         self._window.AddObserver("StartEvent", lambda *_: self._choose_samples())
         app.server.controller.trigger("entered")(self.fit)
 
-    def place(
-        self, across: float, down: float, width: float, height: float
-    ) -> tuple[float, float]:
+    def place(self, across: float, down: float, width: float, height: float) -> tuple[float, float]:
         """Give where a point of a page of this size lies in the picture; see `place_in`."""
         return place_in(across, down, (width, height), self._window.GetSize())
 
