@@ -68,9 +68,9 @@ def find_browser() -> str:
     return path
 
 
-def open_page(browser: Any, address: str) -> Any:
+def open_page(browser: Any, address: str, *, width: int = 1200, height: int = 760) -> Any:
     """Open the viewer's page, and collect what it complains of and what it asks others for."""
-    page = browser.new_page(viewport={"width": 1200, "height": 760})
+    page = browser.new_page(viewport={"width": width, "height": height})
     page.complaints = []
     page.strangers = []
 

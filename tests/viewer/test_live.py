@@ -168,9 +168,14 @@ def test_trees_are_felled_and_marked_and_acts_taken_back(page: Any, kept: Kept) 
     wait_for_text(page, "#panel-work", "fell trees 1, 2")
     page.click("#undo")
     wait_for_text(page, "#panel-work", "Nothing waits")
-    page.fill("#fell-value", "2000")
+    wait_for_text(page, "#fell-said", "Would fell 1 of 3 trees")  # a light thinning from below
+    page.click("#fell-to", force=True)
+    page.click(".v-list-item:has-text('leave N')")
+    page.fill("#fell-value", "700")
+    wait_for_text(page, "#fell-said", "Would fell 2 of 3 trees")
     page.click("#fell-rule-go")
-    wait_for_text(page, "#panel-work", "thin below, n_ha 2000")
+    wait_for_text(page, "#panel-work", "thin below, n_ha 700")
+    wait_for_text(page, "#fell-said", "Would fell 0 of 1 trees")
     page.click("#undo")
     wait_for_text(page, "#panel-work", "Nothing waits")
     page.fill("#fell-ids", "1, 99")
@@ -251,6 +256,31 @@ def test_a_stroke_of_the_brush_lays_markers(page: Any, kept: Kept) -> None:
     assert len(act["points_m"]) > 2 and act["points_m"][-1][2] > act["points_m"][0][2] > -0.1
     session = take_up(Scenario.load(kept.scenario), kept.session)
     assert len(session.markers_to_come) > 50
+
+
+def test_a_stroke_is_as_thick_as_the_pen_is_pressed(page: Any, kept: Kept) -> None:
+    box = page.locator("#picture").bounding_box()
+    x, y = box["x"] + 0.3 * box["width"], box["y"] + 0.6 * box["height"]
+    page.mouse.move(x, y)
+    pen = page.context.new_cdp_session(page)
+
+    def sent(kind: str, k: int, force: float) -> None:
+        held = {"button": "left", "buttons": 0 if kind == "mouseReleased" else 1, "clickCount": 1}
+        at = {"x": x, "y": y - 25 * k, "force": force, "pointerType": "pen"}
+        pen.send("Input.dispatchMouseEvent", {"type": kind, **at, **held})
+
+    sent("mousePressed", 0, 0.25)
+    pressures = (0.25, 0.25, 0.5, 0.75, 1.0)
+    for k, force in enumerate(pressures):
+        sent("mouseMoved", k + 1, force)
+    sent("mouseReleased", len(pressures), 0.0)
+    wait_for_text(page, "#panel-work", "stroke of")
+    page.wait_for_function("document.querySelectorAll('.act').length >= 2")
+    act = kept.acts[-1]
+    assert act["kind"] == "stroke"
+    radius = [0.224 * force / 0.5 for force in pressures]
+    assert act["radius_m"][: len(radius)] == pytest.approx(radius, abs=2e-4)
+    page.click("#undo")
 
 
 def test_two_pages_and_one_opened_later_show_one_session(
