@@ -216,6 +216,11 @@ class App:
         if self.server.running:
             self.server.controller.view_update()
 
+    @property
+    def dragging(self) -> bool:
+        """Whether a tool is dragged, and pictures follow it."""
+        return self._pressed is not None and self._tool.drags
+
     def warn(self, message: str) -> None:
         """Tell the user in a line why something was not done."""
         self.state.message = message
@@ -333,3 +338,5 @@ class App:
         elif tool.drags:
             now = self.stage.hit(*place, pressure)
             self.tried(lambda: tool.drag(start, now, done=kind == "up"))
+            if kind == "up":
+                self.push()  # smooth again

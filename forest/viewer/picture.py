@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from forest.viewer.app import App
 
-#: Samples of a pixel of a picture at rest (MSAA); while the view turns there is one.
+#: Samples of a pixel of a picture at rest (MSAA); one while the view turns or a tool drags.
 SAMPLES = 4
 
 
@@ -77,4 +77,5 @@ class Picture:
         return bool(asked["ratio"] < 1.0)
 
     def _choose_samples(self) -> None:
-        self._window.SetMultiSamples(0 if self._turning else SAMPLES)
+        moves = self._turning or self._app.dragging
+        self._window.SetMultiSamples(0 if moves else SAMPLES)

@@ -103,6 +103,12 @@ def still(page: Any) -> bytes:
     raise AssertionError("the picture did not come to rest")
 
 
+def heard(page: Any) -> None:
+    """Wait until the server has done what the page has sent, and the page shows it."""
+    page.evaluate("window.trame.trigger('key', [''])")  # a key of no meaning, answered in turn
+    page.wait_for_timeout(50)
+
+
 def changed(page: Any, before: bytes) -> bytes:
     """Wait until the picture is another one, at rest, and give it."""
     end = time.monotonic() + 60.0

@@ -19,7 +19,7 @@ from forest.viewer.live_source import LiveSource
 from forest.viewer.picking import Hit, Ray
 from forest.viewer.surfaces import _Wanted
 from tests.tiny import tiny
-from tests.viewer.browser import Viewing, open_page, still, wait_for_text
+from tests.viewer.browser import Viewing, heard, open_page, still, wait_for_text
 
 _PINE = """
 title = "a young pine"
@@ -93,7 +93,7 @@ def test_a_click_on_bark_in_a_browser_is_an_act_and_the_bark_shows_it(
         down = box["y"] + 0.74 * box["height"]  # where its stem is free of branches
         for k in range(20):
             page.mouse.click(box["x"] + (0.5 + 0.004 * k) * box["width"], down)
-            page.wait_for_timeout(150)
+            heard(page)
             if "crack the bark of tree 1" in page.inner_text("#panel-work"):
                 break
         wait_for_text(page, "#panel-work", "crack the bark of tree 1")

@@ -15,7 +15,7 @@ from forest.record.run import open_run
 from forest.scenario import Scenario
 from forest.simulation import simulate
 from tests.tiny import assert_same_runs, forest
-from tests.viewer.browser import Viewing, changed, open_page, still, wait_for_text
+from tests.viewer.browser import Viewing, changed, heard, open_page, still, wait_for_text
 
 _GROWN = 9
 _LAST = 2000 + _GROWN
@@ -112,7 +112,7 @@ def _a_branch(page: Any) -> tuple[float, float, int, int]:
     for down in [0.38 + 0.02 * k for k in range(14)]:
         for across in (0.2, 0.22, 0.5, 0.52, 0.24, 0.18, 0.8, 0.82):
             _click(page, across, down)
-            page.wait_for_timeout(120)
+            heard(page)
             if not page.locator("#prune-lit").count():
                 continue
             said = re.findall(r"Tree (\d+), metamer (\d+): (\d+)", page.inner_text("#prune-lit"))
@@ -120,7 +120,7 @@ def _a_branch(page: Any) -> tuple[float, float, int, int]:
             if serial > 0 and metamers > 1:
                 return across, down, tree, serial
             _click(page, 0.03, 0.2)  # the sky: nothing is lit
-            page.wait_for_timeout(120)
+            heard(page)
     raise AssertionError("no branch was met")
 
 
@@ -171,6 +171,7 @@ def test_trees_are_felled_and_marked_and_acts_taken_back(page: Any, kept: Kept) 
     wait_for_text(page, "#fell-said", "Would fell 1 of 3 trees")  # a light thinning from below
     page.click("#fell-to", force=True)
     page.click(".v-list-item:has-text('leave N')")
+    heard(page)
     page.fill("#fell-value", "700")
     wait_for_text(page, "#fell-said", "Would fell 2 of 3 trees")
     page.click("#fell-rule-go")
@@ -185,7 +186,7 @@ def test_trees_are_felled_and_marked_and_acts_taken_back(page: Any, kept: Kept) 
     _take(page, "Mark")
     for down in (0.5, 0.48, 0.52, 0.46, 0.54, 0.56, 0.44):  # the tree in the middle, by its stem
         _click(page, 0.5, down)
-        page.wait_for_timeout(300)
+        heard(page)
         if "mark tree 1" in page.inner_text("#panel-work"):
             break
     wait_for_text(page, "#panel-work", "mark tree 1")
