@@ -25,7 +25,7 @@ RULES = {
     "selective": "Thin around crop trees",
     "random": "Thin at random",
     "diameter_limit": "Target diameter: all from it on",
-    "clearcut": "All of them",
+    "clearcut": "Fell all of them",
 }
 _TO_A_GOAL = ("below", "above", "random")
 _HARVESTS = ("diameter_limit", "clearcut")
@@ -63,6 +63,27 @@ def act_of(rule: str, to: str, number: Any, species: str) -> dict[str, Any]:
     if not 0.0 <= value <= 100.0:
         raise InputError(f"{value:g} % are taken", expected="0 to 100")
     return {**kind, to: value / 100.0, **of}
+
+
+def words_of_rule(act: dict[str, Any]) -> str:
+    """Say what an act by one of `RULES` does; "" of other acts."""
+    if act["kind"] not in ("thin", "harvest") or act["method"] not in RULES:
+        return ""
+    said = RULES[act["method"]].lower()
+    values = {
+        "share_g": "take {:.3g} % of G",
+        "share_n": "take {:.3g} % of N",
+        "basal_area_m2ha": "leave G {:g} m²/ha",
+        "n_ha": "leave N {:g}/ha",
+        "limit_cm": "{:g} cm",
+        "crop_trees_ha": "{:g}/ha",
+    }
+    for key, words in values.items():
+        if act.get(key) is not None:
+            said += ", " + words.format(act[key] * (100 if key.startswith("share") else 1))
+    names = act.get("species") or ()
+    names = [names] if isinstance(names, str) else names
+    return said + "".join(f", {species_label(name)}" for name in names)
 
 
 def usual_number(rule: str, to: str, trees: pd.DataFrame, hectares: float) -> float:

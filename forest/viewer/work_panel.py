@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from forest.errors import InputError, years_of
 from forest.viewer.desk import Desk
+from forest.viewer.fell_tool import words_of_rule
 from forest.viewer.fields import text_field
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ def words_of(act: dict[str, Any]) -> str:
     if kind == "stroke":
         only = f", metamer {act['metamer']} alone grows" if act.get("metamer") is not None else ""
         return f"stroke of {len(act['points_m'])} points{only}"
+    if said := words_of_rule(act):
+        return said
     rule = (
         f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}"
         for key, value in act.items()

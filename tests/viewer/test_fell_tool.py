@@ -7,7 +7,7 @@ import pytest
 
 from forest.errors import InputError
 from forest.live import LiveSession
-from forest.viewer.fell_tool import GOALS, RULES, act_of, usual_number
+from forest.viewer.fell_tool import GOALS, RULES, act_of, usual_number, words_of_rule
 from forest.viewer.live_source import LiveSource
 from tests.tiny import tiny
 
@@ -25,6 +25,10 @@ def test_fields_become_acts() -> None:
         "method": "clearcut",
         "species": "picea_abies",
     }
+    assert words_of_rule(act_of("below", "share_g", 29, "picea_abies")) == (
+        "thin from below, take 29 % of G, Picea abies"
+    )
+    assert words_of_rule({"kind": "thin", "method": "geometric", "every_row": 3}) == ""
     with pytest.raises(InputError, match="no number"):
         act_of("below", "n_ha", "", "")
     with pytest.raises(InputError, match="0 to 100"):
