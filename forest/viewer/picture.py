@@ -69,13 +69,12 @@ class Picture:
     @property
     def _turning(self) -> bool:
         """Whether a page turns the view, so that pictures are small."""
-        if not self._app.server.protocol:
-            return False
         asked = self._app.server.protocol_call(
             "viewport.image.push.quality.get", self._app.state.pictureId
         )
         return bool(asked["ratio"] < 1.0)
 
     def _choose_samples(self) -> None:
-        moves = self._turning or self._app.dragging
-        self._window.SetMultiSamples(0 if moves else SAMPLES)
+        if self._app.server.protocol:
+            moves = self._turning or self._app.dragging
+            self._window.SetMultiSamples(0 if moves else SAMPLES)

@@ -95,7 +95,7 @@ def test_rays_meet_boxes() -> None:
         ({"kind": "mark", "tree_ids": [3, 4], "mark": "crop"}, "mark trees 3, 4 'crop'"),
         ({"kind": "prune", "tree_id": 2, "metamer": 7}, "prune tree 2 at metamer 7"),
         ({"kind": "obstacle", "remove": "wall"}, "remove wall"),
-        ({"kind": "thin", "method": "below", "n_ha": 800.0}, "thin below, n_ha 800"),
+        ({"kind": "thin", "method": "below", "n_ha": 800.0}, "thin from below, leave N 800/ha"),
     ],
 )
 def test_acts_are_said_in_words(act: dict[str, object], said: str) -> None:
