@@ -27,7 +27,9 @@ def shoot(page: Any, name: str, *, still: bool = False) -> None:
 
     if not still:
         page.mouse.move(4, 4)
-    page.wait_for_timeout(4000)
+    for wait_ms in (500, 3500):  # until the viewer has answered, and its picture has come
+        page.evaluate("window.trame.trigger('key', [''])")
+        page.wait_for_timeout(wait_ms)
     image = Image.open(BytesIO(page.screenshot())).convert("RGB")
     image.quantize(256, kmeans=1, dither=Image.Dither.NONE).save(
         GALLERY / f"{name}.png", optimize=True
