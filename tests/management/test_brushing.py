@@ -226,6 +226,7 @@ def acts(*more: str) -> str:
     return f"acts=[{', '.join((*STROKES, *more))}]"
 
 
+@pytest.mark.usefixtures("three_threads")
 def test_strokes_on_file_resumed_and_on_threads(tmp_path: Path) -> None:
     """In the middle of strokes and holds; the same by hand."""
     every = "output={checkpoint_every_years=1, sample_trees={ids=[1]}}"
