@@ -9,10 +9,10 @@ import numpy as np
 from forest.errors import InputError
 from forest.scenario.files import MESH_SUFFIXES
 from forest.scenario.shaping import ChangeObstacle
+from forest.view.bodies_scene import surface_of
 from forest.viewer.desk import Desk
 from forest.viewer.fields import as_number, choice_field, choices, number_field, text_field
 from forest.viewer.live_tools import LiveTool
-from forest.viewer.pending import surface_of
 from forest.viewer.picking import Hit, Ray
 
 if TYPE_CHECKING:
