@@ -55,6 +55,8 @@ class LiveSession:
         As it is after the last step.
     kept : bool
         Whether its file holds all that was done: not where a step's could not be written.
+    first_trees, first_residual : DataFrame
+        The trees and the residual trees that stood before its first year.
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class LiveSession:
         self._plan_now: YearOfActs | None = None
         self._planned = False
         self.stand = Stand(scenario, say)
+        self.first_trees, self.first_residual = self.stand.trees, self.stand.residual.table
         self._become(self._with([]))
 
     @property

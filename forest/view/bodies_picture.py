@@ -141,8 +141,8 @@ class Stage:
         if self._solid is not None:
             faces = self._solid.faces.reshape(-1, 4)[:, 1:]
             casters.append((np.asarray(self._solid.points, np.float32), faces))
+        self._plotter.remove_actor(["shadows 0", "shadows 1"], render=False)
         for k, (points, triangles) in enumerate(casters):
-            self._plotter.remove_actor(f"shadows {k}", render=False)
             if len(points):
                 flat = points - points[:, 2:].clip(0.0) * (SUN / SUN[2]).astype(np.float32)
                 flat[:, 2] = 0.0

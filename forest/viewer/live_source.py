@@ -75,7 +75,7 @@ class LiveSource:
         self._near: list[int] = []
         self._first_year = session.scenario.start_year - 1
         self._at_first = self._trees_at_first()
-        self._residual_at_first = session.stand.residual.table
+        self._residual_at_first = session.first_residual
         self.refresh()
 
     def refresh(self) -> None:
@@ -122,8 +122,7 @@ class LiveSource:
 
     def _trees_at_first(self) -> pd.DataFrame:
         """The stand before its first year, with what is not known then."""
-        trees = self.session.stand.trees
-        trees["status"] = "living"
+        trees = self.session.first_trees.assign(status="living")
         for name in COLUMNS:
             if name not in trees:
                 trees[name] = np.nan

@@ -8,6 +8,7 @@ import struct
 from pathlib import Path
 
 _TABLES = {4: Path("/proc/net/tcp"), 6: Path("/proc/net/tcp6")}
+_MAPPED = "::ffff:"  # an address of version 4 in a socket of version 6 (RFC 4291, section 2.5.5.2)
 _LOCAL, _REMOTE, _UID, _INODE = 1, 2, 7, 9  # columns
 _ROOT = 0
 
@@ -23,15 +24,19 @@ def is_own_user(peer: tuple[str, int], here: tuple[str, int]) -> bool:
     peer, here : (str, int)
         Address and port of the other end of the connection, and of ours.
     """
-    table = _TABLES[6 if ":" in peer[0] else 4]
-    if not table.exists():
+    pairs = [(peer, here)]
+    if ":" not in peer[0]:  # its program may use a socket of version 6 all the same
+        pairs.append(((_MAPPED + peer[0], peer[1]), (_MAPPED + here[0], here[1])))
+    tables = [_TABLES[6 if ":" in pair[0][0] else 4] for pair in pairs]
+    if not tables[0].exists():
         return True
-    ends = _coded(*peer), _coded(*here)
-    for line in table.read_text().splitlines()[1:]:
-        row = line.split()
-        if (row[_LOCAL], row[_REMOTE]) == ends:
-            # A socket that its process has closed is nobody's: no inode, and root's id.
-            return int(row[_INODE]) != 0 and int(row[_UID]) in (os.getuid(), _ROOT)
+    for table, pair in zip(tables, pairs, strict=True):
+        ends = _coded(*pair[0]), _coded(*pair[1])
+        for line in table.read_text().splitlines()[1:] if table.exists() else ():
+            row = line.split()
+            if (row[_LOCAL], row[_REMOTE]) == ends:
+                # A socket that its process has closed is nobody's: no inode, and root's id.
+                return int(row[_INODE]) != 0 and int(row[_UID]) in (os.getuid(), _ROOT)
     return False
 
 

@@ -97,6 +97,7 @@ def test_a_picture_has_what_stands_there(run: Run) -> None:
     with Stage(run.scenario.plot.size_m, 7.0, window=ROW) as stage:
         with_wall = stage.picture(trees, colours, obstacles=years.obstacles(2003)).astype(int)
         without = stage.picture(trees, colours).astype(int)
+        assert "shadows 1" not in stage._plotter.actors
         without_oak = stage.picture(trees[trees["tree_id"] > 0], colours).astype(int)
     assert (np.abs(with_wall - without).sum(axis=2) > 30).sum() > 20
     assert (np.abs(without_oak - without).sum(axis=2) > 30).sum() > 20

@@ -82,16 +82,19 @@ def test_other_users_of_the_machine_are_refused(viewing: Viewing, path: str) -> 
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="this system does not tell")
-@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
-def test_the_kernel_tells_whose_a_connection_is(host: str) -> None:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family) as server, socket.socket(family) as client:
+@pytest.mark.parametrize(
+    ("host", "asked"),
+    [("127.0.0.1", "127.0.0.1"), ("::1", "::1"), ("127.0.0.1", "::ffff:127.0.0.1")],
+)
+def test_the_kernel_tells_whose_a_connection_is(host: str, asked: str) -> None:
+    families = [socket.AF_INET6 if ":" in name else socket.AF_INET for name in (host, asked)]
+    with socket.socket(families[0]) as server, socket.socket(families[1]) as client:
         try:
             server.bind((host, 0))
         except OSError:
             pytest.skip("no such interface")
         server.listen()
-        client.connect(server.getsockname()[:2])
+        client.connect((asked, server.getsockname()[1]))
         line, peer = server.accept()
         with line:
             here = line.getsockname()[:2]
