@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from forest.errors import InputError
+from forest.view.bodies_scene import surface_of
 from forest.view.stand_years import COLUMNS as BODY_COLUMNS
 from forest.view.standing import (
     EVENT_COLUMNS,
@@ -24,6 +25,7 @@ from forest.viewer.source import COLUMNS, largest_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from typing import Any
 
     import pandas as pd
     from numpy.typing import NDArray
@@ -61,6 +63,8 @@ class LiveSource:
         Held while a year grows, and while something is read of the session.
     growing : bool
         Whether a year grows.
+    solids : dict of Obstacle to pyvista.PolyData
+        The obstacles as the acts that wait will leave them, with their surfaces.
 
     Raises
     ------
@@ -73,6 +77,7 @@ class LiveSource:
         self.lock, self.growing = Lock(), False
         self.title = session.scenario.title or Path(where).name
         self._near: list[int] = []
+        self.solids: dict[Obstacle, Any] = {}
         self._first_year = session.scenario.start_year - 1
         self._at_first = self._trees_at_first()
         self._residual_at_first = session.first_residual
@@ -98,7 +103,8 @@ class LiveSource:
         self.largest = largest_of(self._trees if len(records) else self._at_first)
         self.living = self.session.trees()
         self.pending = self.session.pending
-        self.obstacles = self.session.obstacles
+        known, self.obstacles = self.solids, self.session.obstacles
+        self.solids = {o: known[o] if o in known else surface_of(o) for o in self.obstacles}
         self.markers_to_come = self.session.markers_to_come
         self.markers_laid = self._free_markers()
         self.strokes = self.session.stand.strokes

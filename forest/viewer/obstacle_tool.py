@@ -9,7 +9,6 @@ import numpy as np
 from forest.errors import InputError
 from forest.scenario.files import MESH_SUFFIXES
 from forest.scenario.shaping import ChangeObstacle
-from forest.view.bodies_scene import surface_of
 from forest.viewer.desk import Desk
 from forest.viewer.fields import as_number, choice_field, choices, number_field, text_field
 from forest.viewer.live_tools import LiveTool
@@ -111,8 +110,8 @@ class ObstacleTool(LiveTool):
     def _under(self, ray: Ray) -> str | None:
         """Name the first obstacle with a name whose bounding box a ray meets."""
         found = []
-        for each in self.desk.source.obstacles:
-            low, high = np.array(surface_of(each).bounds).reshape(3, 2).T
+        for each, surface in self.desk.source.solids.items():
+            low, high = np.array(surface.bounds).reshape(3, 2).T
             way = enters_box(ray, low, high)
             if way is not None and each.name:
                 found.append((way, each.name))

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from forest.view.bodies_scene import surface_of
 from forest.viewer.drawing import draw_points, draw_rings, draw_surfaces
 from forest.viewer.live_source import LiveSource
 from forest.viewer.stage import Stage
@@ -58,7 +57,7 @@ def draw_obstacles(
 ) -> None:
     """Draw the obstacles, some of them moved, by name, by so much (m)."""
     surfaces = []
-    for each in source.obstacles:
+    for each, surface in source.solids.items():
         by = (moved or {}).get(each.name, (0.0, 0.0, 0.0))
-        surfaces.append(surface_of(each).translate(by))
+        surfaces.append(surface.translate(by))
     draw_surfaces(stage, "obstacles", surfaces, _BOX)

@@ -43,3 +43,7 @@ def test_a_mesh_is_put_where_the_ground_is_clicked(tmp_path: Path) -> None:
     assert len(session.pending) == 1
     tool.click(ground._replace(ray=ray._replace(origin=np.array([7.0, 7.0, 5.0]))))
     assert [each.name for each in session.obstacles] == ["mesh 1", "box 1"]
+    mesh.unlink()  # it was read once
+    tool.desk.draw()  # type: ignore[attr-defined]
+    tool.click(ground)
+    assert len(session.pending) == 2
