@@ -103,16 +103,10 @@ def still(page: Any) -> bytes:
     raise AssertionError("the picture did not come to rest")
 
 
-# A key of no meaning, which is answered in turn; what came with the answer is in the page then.
-_HEARD = """async () => {
-  await window.trame.trigger('key', ['']);
-  await new Promise((done) => setTimeout(done));
-}"""
-
-
 def heard(page: Any) -> None:
     """Wait until the server has done what the page has sent, and the page shows it."""
-    page.evaluate(_HEARD)
+    page.evaluate("window.trame.trigger('key', [''])")  # a key of no meaning, answered in turn
+    page.wait_for_timeout(50)
 
 
 def changed(page: Any, before: bytes) -> bytes:
