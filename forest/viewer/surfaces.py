@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ SHAPES = {
 }
 _MADE = ("tubes", "blended", "bark")
 _MOST_KEPT = 12
+_LEAVES = 0.6  # of a leaf's colour that is seen on its side away from the sun
 _ACROSS = 0.45  # of the light that a slope gets more or less
 
 
@@ -134,7 +135,7 @@ class Surfaces:
             stage.dress(None)
             return
         parts = [_unbumped(part) for part in self._kept[wanted]]
-        stage.put("surface", lambda plotter: add_textured(plotter, parts))
+        stage.put("surface", lambda plotter: _add(plotter, parts))
         stage.dress(wanted.tree_id)
         count = sum(len(part.mesh.triangles) for part in parts)
         said = f"{SHAPES[wanted.shape][1]}: {count:,} triangles"
@@ -176,6 +177,15 @@ class Surfaces:
             if self._refused and (app.chosen, app.year, state.shape) == wanted[:3]:
                 state.shape = "branches"
             app.refresh()
+
+
+def _add(plotter: Any, parts: list[Part]) -> None:
+    """Add a surface; leaves, which are cut out of cards, let light through."""
+    before = set(plotter.actors)
+    add_textured(plotter, parts)
+    for name in set(plotter.actors) - before:
+        if plotter.actors[name].GetForceOpaque():
+            plotter.actors[name].prop.ambient = _LEAVES
 
 
 def _unbumped(part: Part) -> Part:
