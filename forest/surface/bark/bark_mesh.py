@@ -50,7 +50,7 @@ def dressed_parts(bark: TreeBark, wood: Mesh, size: int = 1024) -> list[Part]:
     wood : Mesh
         The same tree's surface.
     size : int
-        Pixels of the trunk's map around and along; see `TreeBark.maps`.
+        Pixels of the trunk's map around; see `TreeBark.maps`.
 
     Returns
     -------

@@ -154,7 +154,7 @@ def _stray(rings: Any, physics: Any, seed: Any, fracture: Any, to: Any) -> Any:
 
 
 @njit
-def _end_of(rings: Any, fracture: Any, upper: Any) -> Any:
+def end_of(rings: Any, fracture: Any, upper: Any) -> Any:
     """Find a fracture's upper (1) or lower (0) end: its tear, and which way it runs there."""
     node = np.int64(rings.last[fracture] if upper else rings.first[fracture])
     ahead = rings.tear_up[node] if upper else rings.tear_down[node]
@@ -166,7 +166,7 @@ def _end_of(rings: Any, fracture: Any, upper: Any) -> Any:
 
 
 @njit
-def _is_held(rings: Any, physics: Any, fracture: Any, upper: Any, moment: Any) -> Any:
+def is_held(rings: Any, physics: Any, fracture: Any, upper: Any, moment: Any) -> Any:
     """Whether an end has run as far as it may in this step, or the Inglis ratio is too small."""
     reach = rings.reach[fracture]
     if reach < physics.flaw_m:
@@ -188,9 +188,9 @@ def ahead_of(
     Returns the load (1 where it just runs, 0 where it is stopped, infinite for a flaw), record and
     strip, place on the epidermis, and which way it goes on from there.
     """
-    node, runs = _end_of(rings, fracture, upper)
+    node, runs = end_of(rings, fracture, upper)
     none = (0.0, np.int64(-1), np.int64(-1), 0.0, runs)
-    if _is_held(rings, physics, fracture, upper, moment):
+    if is_held(rings, physics, fracture, upper, moment):
         return none
     s = np.int64(rings.tear_strip[node])
     i = _record_of(rings, node)
@@ -239,7 +239,7 @@ def run_on(
     time: Any,
 ) -> Any:
     """Let an end of a fracture tear the piece behind record k of strip `to`; whether it did."""
-    node, runs = _end_of(rings, fracture, upper)
+    node, runs = end_of(rings, fracture, upper)
     new = tear(rings, to, k, place, fracture, time)
     if new < 0:
         return False

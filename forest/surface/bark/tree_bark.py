@@ -36,6 +36,8 @@ _Floats = NDArray[np.float64]
 LAWS = ("preset", "conserved")
 _STEPS = 20  # of shrinking
 _STEPS_BEFORE = 12  # in which what had torn before the first year on record tears
+_MOST_ROWS = 8192  # of a map of given columns; more no browser may take
+_MOST_PIXELS = 2**23
 _FOLD = 0.35  # height of a fold, in radii of the branch
 _MOST_FOLD_M = 0.015
 _FOLD_OF_STEM = 0.06  # nor more than this part of the radius of what bears the branch
@@ -254,8 +256,11 @@ class TreeBark:
         Parameters
         ----------
         size : int or (columns, rows)
-            Pixels around and along. With one number the trunk has as many rows, and the thinner
-            and shorter axes have fewer of both, in powers of two, so that pixels are as large.
+            Pixels around and along. With one number it is that around the trunk's foot. Thinner
+            axes have fewer, and the rows follow the length, so that all pixels are about as large
+            and square: both are powers of two, by rounding. A map has 8192
+            rows and 2^23 pixels at most (but as many rows as `size` in any case); pixels of long
+            axes are therefore taller than wide.
         axes : tuple of int, optional
             Which axes; all unless given.
         low_m, high_m : float, optional
@@ -267,17 +272,19 @@ class TreeBark:
         found = {}
         for axis in self.axes if axes is None else axes:
             piece = self.piece(axis, low_m, high_m)
-            pixels = self._pixels(axis, size) if isinstance(size, int) else size
+            length = float(piece.strips.width.sum())
+            pixels = self._pixels(axis, size, length) if isinstance(size, int) else size
             folds = self.folds(axis)
             found[axis] = bark_maps(piece, dress, pixels, axis=axis, folds=folds, seed=self.seed)
         return found
 
-    def _pixels(self, axis: int, size: int) -> tuple[int, int]:
+    def _pixels(self, axis: int, size: int, length_m: float) -> tuple[int, int]:
         """Fewer pixels where there is less to show."""
-        trunk, path = self.tree.paths[0], self.tree.path(axis)
-        wide = path.radius[0] / trunk.radius[0]
-        tall = (path.high - path.low) / (trunk.high - trunk.low)
-        return _power(size * wide), _power(size * tall)
+        trunk, path = self.tree.paths[0].radius[0], self.tree.path(axis).radius[0]
+        columns = _power(size * path / trunk)
+        rows = _power(size * length_m / (2.0 * np.pi * trunk))
+        most = max(min(_MOST_PIXELS // columns, _MOST_ROWS), size)
+        return columns, min(rows, most)
 
     def folds(self, axis: int) -> list[Fold]:
         """Give the folds of an axis' bark: one in the crotch of each barked branch (section 7)."""
@@ -302,7 +309,7 @@ class TreeBark:
 
 
 def _power(pixels: float) -> int:
-    return int(2 ** max(np.ceil(np.log2(max(pixels, 1.0)) - 1e-9), 6))
+    return int(2 ** max(np.round(np.log2(max(pixels, 1.0))), 6))
 
 
 def bark_tree(
