@@ -231,7 +231,7 @@ def _lay_ring(
         x, y, z = base + radius * (math.cos(turn) * side + math.sin(turn) * other)
         chain.cone[i] = foot
         chain.state[i] = FLOWING
-        put(surface, chain, np.int64(i), float(x), float(y), float(z))
+        put(surface, chain, rules.forces(unit), np.int64(i), float(x), float(y), float(z))
         way = grain_heading(chain.normal[i], line, math.cos(lean), math.sin(lean))
         chain.velocity[i] = rules.speed * unit * np.array(way)
         chain.ahead[i], chain.behind[i] = first + (k + 1) % n, first + (k - 1) % n

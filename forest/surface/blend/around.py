@@ -1,0 +1,188 @@
+"""What of a surface can matter near a point, kept for those who ask there again and again.
+
+A walk through the trees of boxes costs more than the few cones and joints that it finds. A point
+that creeps over the surface therefore keeps them, as lists that hold everywhere within a reach of
+the place where they were gathered. What they give is the same, bit for bit, as without.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forest._jit import njit
+from forest.surface.blend.field import cone, joint, smooth_least, value
+from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
+
+#: Most cones, and most joints, that a list holds; where more are near, all are looked at.
+ROOM = 24
+
+
+class Around(NamedTuple):
+    """Cones and joints near points, a row for each point."""
+
+    cones: NDArray[np.int32]  # (n, ROOM)
+    joints: NDArray[np.int32]  # (n, ROOM) twice the joint, and 1 more for the first of a place
+    count: NDArray[np.int32]  # (n, 2) cones and joints; below 0: no list
+    middle: NDArray[np.float64]  # (n, 3) where they were gathered
+
+
+def empty_around(room: int) -> Around:
+    """Make room for lists; all have to be gathered yet."""
+    return Around(
+        cones=np.zeros((room, ROOM), np.int32),
+        joints=np.zeros((room, ROOM), np.int32),
+        count=np.full((room, 2), -1, np.int32),
+        middle=np.zeros((room, 3)),
+    )
+
+
+@njit
+def _at_least(cones: Any, i: Any, x: Any, y: Any, z: Any) -> Any:
+    """Bound a cone's value from below by one that changes by no more than x is moved."""
+    ax, ay, az = cones.start[i, 0], cones.start[i, 1], cones.start[i, 2]
+    lx, ly, lz = cones.end[i, 0] - ax, cones.end[i, 1] - ay, cones.end[i, 2] - az
+    px, py, pz = x - ax, y - ay, z - az
+    t = (px * lx + py * ly + pz * lz) / (lx * lx + ly * ly + lz * lz)
+    t = min(max(t, 0.0), 1.0)
+    px, py, pz = px - t * lx, py - t * ly, pz - t * lz
+    axis = cones.axis[i]
+    wide = max(cones.low[i], cones.high[i]) + cones.widened[axis] + cones.flare[axis, 1]
+    return np.sqrt(px * px + py * py + pz * pz) - wide
+
+
+@njit
+def _axis_at_least(cones: Any, first: Any, last: Any, x: Any, y: Any, z: Any) -> Any:
+    least = np.inf
+    for i in range(first, last):
+        least = min(least, _at_least(cones, i, x, y, z))
+    return least
+
+
+@njit
+def _may_blend(field: Any, j: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
+    """Whether a joint can have a share anywhere within the reach of a point."""
+    joints = field.joints
+    dx = x - joints.point[j, 0]
+    dy = y - joints.point[j, 1]
+    dz = z - joints.point[j, 2]
+    if np.sqrt(dx * dx + dy * dy + dz * dz) > joints.reach[j] + reach:
+        return False
+    if field.printed[0]:
+        return True
+    far = joints.near[j] + reach
+    for k in range(2):
+        first, last = joints.first[j, k], joints.last[j, k]
+        if _axis_at_least(field.cones, first, last, x, y, z) > far:
+            return False
+    return True
+
+
+@njit
+def _gather_cones(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> Any:
+    """List the cones whose value can be least within the reach; gives how many, -1 if too many."""
+    count = 0
+    node = np.int64(1)
+    leaves = field.boxes.leaves[0]
+    while node > 0:
+        if distance_to_box(field.boxes, node, x, y, z) > reach:
+            node = past(node)
+            continue
+        if node < leaves:
+            node *= 2
+            continue
+        first = (node - leaves) * PER_LEAF
+        for k in range(first, min(first + PER_LEAF, len(field.boxes.item))):
+            i = field.boxes.item[k]
+            if _at_least(field.cones, i, x, y, z) <= reach:
+                if count == ROOM:
+                    return -1
+                row[count] = i
+                count += 1
+        node = past(node)
+    return count
+
+
+@njit
+def _gather_joints(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> Any:
+    """List the joints that can blend within the reach; gives how many, -1 if too many."""
+    count = 0
+    joints = field.joints
+    node = np.int64(1)
+    leaves = field.places.leaves[0]
+    while node > 0:
+        if distance_to_box(field.places, node, x, y, z) > reach:
+            node = past(node)
+            continue
+        if node < leaves:
+            node *= 2
+            continue
+        first = (node - leaves) * PER_LEAF
+        for k in range(first, min(first + PER_LEAF, len(field.places.item))):
+            place = field.places.item[k]
+            fresh = 1
+            for j in range(joints.place[place], joints.place[place + 1]):
+                if not _may_blend(field, j, x, y, z, reach):
+                    continue
+                if count == ROOM:
+                    return -1
+                row[count] = 2 * j + fresh
+                fresh = 0
+                count += 1
+        node = past(node)
+    return count
+
+
+@njit
+def gather(field: Any, around: Any, n: Any, x: Any, y: Any, z: Any, reach: Any) -> None:
+    """List for point n what matters within a reach, m, of a place."""
+    cones = _gather_cones(field, x, y, z, reach, around.cones[n])
+    joints = _gather_joints(field, x, y, z, reach, around.joints[n])
+    around.count[n, 0] = cones if joints >= 0 else -1
+    around.count[n, 1] = joints
+    around.middle[n, 0], around.middle[n, 1], around.middle[n, 2] = x, y, z
+
+
+@njit
+def _blend_around(field: Any, around: Any, n: Any, plain: Any, x: Any, y: Any, z: Any) -> Any:
+    """As `field` lets all joints change the plain value, but with those of the list."""
+    best = plain
+    here = np.inf
+    moved = total = 0.0
+    for k in range(around.count[n, 1]):
+        j = around.joints[n, k] // 2
+        if around.joints[n, k] & 1:
+            best = min(best, here)
+            here = np.inf
+        blended, unblended, share = joint(field, j, x, y, z)
+        if share > 0.0:
+            here = smooth_least(here, blended, 0.3 * field.joints.thin[j] * share)
+            moved += share * (blended - unblended)
+            total += share
+    if field.printed[0]:
+        return plain + moved / total if total > 0.0 else plain
+    return min(best, here)
+
+
+@njit
+def value_around(
+    field: Any, around: Any, n: Any, reach: Any, x: Any, y: Any, z: Any, hint: Any
+) -> Any:
+    """`field.value` at a point, by the lists of point n where they hold."""
+    count = around.count[n, 0]
+    if count <= 0:
+        return value(field, x, y, z, hint)
+    dx, dy, dz = x - around.middle[n, 0], y - around.middle[n, 1], z - around.middle[n, 2]
+    best = np.inf
+    which = np.int64(hint)
+    for k in range(count):
+        i = np.int64(around.cones[n, k])
+        one = cone(field.cones, i, x, y, z)[0]
+        if one < best or (one == best and i < which):
+            best = one
+            which = i
+    if np.sqrt(dx * dx + dy * dy + dz * dz) + max(best, 0.0) > reach:
+        return value(field, x, y, z, hint)
+    return _blend_around(field, around, n, best, x, y, z), which
