@@ -1,8 +1,8 @@
-"""What of a surface can matter near a point, kept for those who ask there again and again.
+"""The surface as something sees it that creeps over one limb: that limb and those that start with it.
 
-A walk through the trees of boxes costs more than the few cones and joints that it finds. A point
-that creeps over the surface therefore keeps them, as lists that hold everywhere within a reach of
-the place where they were gathered. What they give is the same, bit for bit, as without.
+Limbs that cross elsewhere are not seen; what creeps goes through their wood. And a walk through
+the trees of boxes costs more than the few cones and joints that it finds, so that they are kept, as
+lists that hold everywhere within a reach of the place where they were gathered.
 """
 
 from __future__ import annotations
@@ -13,11 +13,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
+from forest.surface.blend.cones import Limbs
 from forest.surface.blend.field import cone, joint, smooth_least, value
 from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
 
-#: Most cones, and most joints, that a list holds; where more are near, all are looked at.
-ROOM = 24
+#: Most cones, and most joints, that a list holds; where more are near, the whole surface is seen.
+ROOM = 32
+
+
+class Kin(NamedTuple):
+    """The axes that each axis sees besides itself, one axis after the other."""
+
+    first: NDArray[np.int64]  # (axes + 1,) first of `other` of each axis
+    other: NDArray[np.int64]
+
+
+def kin_of(limbs: Limbs) -> Kin:
+    """List the axes that share a joint, or blend with a third in joints whose reaches touch."""
+    joints = limbs.joints
+    pair = limbs.cones.axis[joints.first].astype(np.int64).reshape(-1, 2)
+    found = [pair]
+    order = np.argsort(pair.ravel(), kind="stable")  # ends of joints, by axis
+    ends = np.split(order, np.flatnonzero(np.diff(pair.ravel()[order])) + 1)
+    for end in ends:
+        joint_of, other = end // 2, pair.ravel()[end ^ 1]
+        apart = np.linalg.norm(joints.point[joint_of][:, None] - joints.point[joint_of], axis=2)
+        reach = joints.reach[joint_of]
+        i, j = np.nonzero(apart < reach[:, None] + reach)
+        found.append(np.column_stack((other[i], other[j])))
+    both = np.concatenate(found)
+    both = np.unique(np.concatenate((both, both[:, ::-1])), axis=0)
+    both = both[both[:, 0] != both[:, 1]]
+    count = np.bincount(both[:, 0], minlength=len(limbs.cones.reach))
+    return Kin(np.concatenate(([0], np.cumsum(count))), np.ascontiguousarray(both[:, 1]))
 
 
 class Around(NamedTuple):
@@ -25,8 +53,10 @@ class Around(NamedTuple):
 
     cones: NDArray[np.int32]  # (n, ROOM)
     joints: NDArray[np.int32]  # (n, ROOM) twice the joint, and 1 more for the first of a place
-    count: NDArray[np.int32]  # (n, 2) cones and joints; below 0: no list
+    count: NDArray[np.int32]  # (n, 2) cones and joints; below 0: too many
     middle: NDArray[np.float64]  # (n, 3) where they were gathered
+    reach: NDArray[np.float64]  # (n,) how far from there they hold, m
+    axis: NDArray[np.int32]  # (n,) the limb for which; -1: for none yet
 
 
 def empty_around(room: int) -> Around:
@@ -36,7 +66,20 @@ def empty_around(room: int) -> Around:
         joints=np.zeros((room, ROOM), np.int32),
         count=np.full((room, 2), -1, np.int32),
         middle=np.zeros((room, 3)),
+        reach=np.zeros(room),
+        axis=np.full(room, -1, np.int32),
     )
+
+
+@njit
+def _sees(kin: Any, axis: Any, other: Any) -> Any:
+    """Whether one limb is another, or joined to it."""
+    if axis == other:
+        return True
+    for k in range(kin.first[axis], kin.first[axis + 1]):
+        if kin.other[k] == other:
+            return True
+    return False
 
 
 @njit
@@ -81,8 +124,10 @@ def _may_blend(field: Any, j: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
 
 
 @njit
-def _gather_cones(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> Any:
-    """List the cones whose value can be least within the reach; gives how many, -1 if too many."""
+def _gather_cones(
+    field: Any, kin: Any, axis: Any, x: Any, y: Any, z: Any, reach: Any, row: Any
+) -> Any:
+    """List the cones seen whose value can be least within the reach; gives how many, -1 if too many."""
     count = 0
     node = np.int64(1)
     leaves = field.boxes.leaves[0]
@@ -96,7 +141,8 @@ def _gather_cones(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> A
         first = (node - leaves) * PER_LEAF
         for k in range(first, min(first + PER_LEAF, len(field.boxes.item))):
             i = field.boxes.item[k]
-            if _at_least(field.cones, i, x, y, z) <= reach:
+            near = _at_least(field.cones, i, x, y, z) <= reach
+            if near and _sees(kin, axis, field.cones.axis[i]):
                 if count == ROOM:
                     return -1
                 row[count] = i
@@ -106,10 +152,13 @@ def _gather_cones(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> A
 
 
 @njit
-def _gather_joints(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> Any:
-    """List the joints that can blend within the reach; gives how many, -1 if too many."""
+def _gather_joints(
+    field: Any, kin: Any, axis: Any, x: Any, y: Any, z: Any, reach: Any, row: Any
+) -> Any:
+    """List the joints of limbs seen that can blend within the reach; gives how many, -1 if too many."""
     count = 0
     joints = field.joints
+    axes = field.cones.axis
     node = np.int64(1)
     leaves = field.places.leaves[0]
     while node > 0:
@@ -126,6 +175,9 @@ def _gather_joints(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> 
             for j in range(joints.place[place], joints.place[place + 1]):
                 if not _may_blend(field, j, x, y, z, reach):
                     continue
+                one, other = axes[joints.first[j, 0]], axes[joints.first[j, 1]]
+                if not (_sees(kin, axis, one) or _sees(kin, axis, other)):
+                    continue
                 if count == ROOM:
                     return -1
                 row[count] = 2 * j + fresh
@@ -136,13 +188,17 @@ def _gather_joints(field: Any, x: Any, y: Any, z: Any, reach: Any, row: Any) -> 
 
 
 @njit
-def gather(field: Any, around: Any, n: Any, x: Any, y: Any, z: Any, reach: Any) -> None:
-    """List for point n what matters within a reach, m, of a place."""
-    cones = _gather_cones(field, x, y, z, reach, around.cones[n])
-    joints = _gather_joints(field, x, y, z, reach, around.joints[n])
+def gather(
+    field: Any, kin: Any, around: Any, n: Any, axis: Any, x: Any, y: Any, z: Any, reach: Any
+) -> None:
+    """List for point n, on a limb, what matters within a reach, m, of a place."""
+    cones = _gather_cones(field, kin, axis, x, y, z, reach, around.cones[n])
+    joints = _gather_joints(field, kin, axis, x, y, z, reach, around.joints[n])
     around.count[n, 0] = cones if joints >= 0 else -1
     around.count[n, 1] = joints
     around.middle[n, 0], around.middle[n, 1], around.middle[n, 2] = x, y, z
+    around.reach[n] = reach
+    around.axis[n] = axis
 
 
 @njit
@@ -168,21 +224,24 @@ def _blend_around(field: Any, around: Any, n: Any, plain: Any, x: Any, y: Any, z
 
 @njit
 def value_around(
-    field: Any, around: Any, n: Any, reach: Any, x: Any, y: Any, z: Any, hint: Any
+    field: Any, kin: Any, around: Any, n: Any, x: Any, y: Any, z: Any, hint: Any
 ) -> Any:
-    """`field.value` at a point, by the lists of point n where they hold."""
-    count = around.count[n, 0]
-    if count <= 0:
-        return value(field, x, y, z, hint)
-    dx, dy, dz = x - around.middle[n, 0], y - around.middle[n, 1], z - around.middle[n, 2]
-    best = np.inf
-    which = np.int64(hint)
-    for k in range(count):
-        i = np.int64(around.cones[n, k])
-        one = cone(field.cones, i, x, y, z)[0]
-        if one < best or (one == best and i < which):
-            best = one
-            which = i
-    if np.sqrt(dx * dx + dy * dy + dz * dz) + max(best, 0.0) > reach:
-        return value(field, x, y, z, hint)
-    return _blend_around(field, around, n, best, x, y, z), which
+    """The implicit function as point n sees it, and the cone nearest of those seen.
+
+    Where the lists of point n do not hold, they are gathered anew.
+    """
+    while around.count[n, 0] >= 0:
+        dx, dy, dz = x - around.middle[n, 0], y - around.middle[n, 1], z - around.middle[n, 2]
+        best = np.inf
+        which = np.int64(hint)
+        for k in range(around.count[n, 0]):
+            i = np.int64(around.cones[n, k])
+            one = cone(field.cones, i, x, y, z)[0]
+            if one < best or (one == best and i < which):
+                best = one
+                which = i
+        if np.sqrt(dx * dx + dy * dy + dz * dz) + max(best, 0.0) <= around.reach[n]:
+            return _blend_around(field, around, n, best, x, y, z), which
+        reach = max(around.reach[n], 1.01 * best) if best < np.inf else 2.0 * around.reach[n]
+        gather(field, kin, around, n, around.axis[n], x, y, z, reach)
+    return value(field, x, y, z, hint)

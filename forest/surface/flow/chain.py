@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from forest._jit import njit
 from forest.surface.blend.around import Around, empty_around, gather
-from forest.surface.flow.relink import relink
+from forest.surface.flow.relink import apart, relink
 from forest.surface.flow.surface import Seen, foot, settle
 
 _Floats = NDArray[np.float64]
@@ -102,19 +102,19 @@ def with_room(chain: Chain, room: int) -> Chain:
 
 @njit
 def _look_around(surface: Any, chain: Any, i: Any, reach: Any, x: Any, y: Any, z: Any) -> None:
-    """Gather anew what is near a particle if it leaves the middle of its lists."""
+    """Gather what is near a particle if it has left the middle of its lists, or its limb."""
     middle = chain.around.middle[i]
     square = (x - middle[0]) ** 2 + (y - middle[1]) ** 2 + (z - middle[2]) ** 2
-    if square > (_WORN * reach) ** 2 or chain.around.count[i, 0] < 0:
-        gather(surface.field, chain.around, i, x, y, z, reach)
+    axis = chain.limb[i]
+    if square > (_WORN * reach) ** 2 or chain.around.axis[i] != axis:
+        gather(surface.field, surface.kin, chain.around, i, axis, x, y, z, reach)
 
 
 @njit
 def put(surface: Any, chain: Any, forces: Any, i: Any, x: Any, y: Any, z: Any) -> None:
     """Put a particle on the surface; its velocity keeps what is tangential."""
-    reach = _REACH * forces.greatest
-    _look_around(surface, chain, i, reach, x, y, z)
-    seen = Seen(surface.field, chain.around, i, reach)
+    _look_around(surface, chain, i, _REACH * forces.greatest, x, y, z)
+    seen = Seen(surface.field, surface.kin, chain.around, i)
     x, y, z, nx, ny, nz, off, which = settle(seen, x, y, z, chain.cone[i], chain.normal[i])
     v = chain.velocity[i]
     across = v[0] * nx + v[1] * ny + v[2] * nz
@@ -201,6 +201,7 @@ def _put_between(surface: Any, chain: Any, forces: Any, a: Any, b: Any) -> None:
     chain.tally[1] += 1
     chain.state[m] = FLOWING
     chain.cone[m] = chain.cone[a]
+    chain.limb[m] = chain.limb[a]
     chain.mother[m] = a
     for k in range(3):
         chain.velocity[m, k] = 0.5 * (chain.velocity[a, k] + chain.velocity[b, k])
@@ -248,9 +249,13 @@ def _mend_links(surface: Any, chain: Any, forces: Any) -> None:
         if square > (finer * forces.greatest) ** 2:
             _put_between(surface, chain, forces, a, b)
         elif square < (finer * forces.least) ** 2:
-            third = chain.ahead[chain.ahead[b]]
-            if third != a and chain.ahead[b] != a:  # more than LEAST_LOOP
+            third = chain.ahead[b]
+            if chain.ahead[third] != a and third != a:  # more than LEAST_LOOP
                 _take_out(chain, min(a, b), max(a, b))
+            elif apart(chain.place, third, a) < (finer * forces.least) ** 2:
+                for i in (a, b, third):  # nothing is left within the loop
+                    chain.state[i] = DONE
+                    chain.velocity[i] = 0.0
     kept = 0
     for j in range(chain.tally[1]):
         if chain.state[chain.live[j]] != GONE:

@@ -32,6 +32,8 @@ _Ints = NDArray[np.int64]
 RECORD_EVERY = 5
 #: The chain is stuck when it moves slower than this share of the speed at which it started.
 _STUCK = 0.02
+#: The flow ends when it takes so many times as long as straight to the farthest tip.
+_PATIENCE = 4.0
 #: Height of the ring at the start above the ground, units.
 _START = 0.1
 
@@ -230,6 +232,7 @@ def _lay_ring(
         turn = 2.0 * math.pi * k / n
         x, y, z = base + radius * (math.cos(turn) * side + math.sin(turn) * other)
         chain.cone[i] = foot
+        chain.limb[i] = cones.axis[foot]
         chain.state[i] = FLOWING
         put(surface, chain, rules.forces(unit), np.int64(i), float(x), float(y), float(z))
         way = grain_heading(chain.normal[i], line, math.cos(lean), math.sin(lean))
@@ -304,8 +307,8 @@ def flow(
             raise InputError(f"{value:g}", where=name, expected="a finite number above 0")
     forces = rules.forces(unit)
     chain = _start(surface, rules, unit)
-    far = float(np.linalg.norm(cones.end - cones.start, axis=1).sum())
-    longest = 4.0 * far / (rules.speed * unit) if seconds is None else seconds
+    far = float(np.linalg.norm(cones.end - cones.start[0], axis=1).max())
+    longest = _PATIENCE * far / (rules.speed * unit) if seconds is None else seconds
     trails = _Recorder()
     shown = [_loops(chain, 0.0)]
     trails.take(chain, 0.0)

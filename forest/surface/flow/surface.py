@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
-from forest.surface.blend.around import Around, value_around
+from forest.surface.blend.around import Around, Kin, kin_of, value_around
 from forest.surface.blend.field import Blend, cone, slope_alone
 
 _Floats = NDArray[np.float64]
@@ -40,16 +40,17 @@ class Limbed(NamedTuple):
     """What a kernel needs of a surface with limbs."""
 
     field: Any  # of `forest.surface.blend.field`
+    kin: Kin
     free: NDArray[np.bool_]  # (axes,) whether the axis ends in a tip, not in a fork
 
 
 class Seen(NamedTuple):
-    """The surface as one particle sees it, with lists of what is near (`blend.around`)."""
+    """The surface as one particle sees it (`blend.around`)."""
 
     field: Any
+    kin: Kin
     around: Around
     number: Any
-    reach: Any  # within which the lists hold, m
 
 
 def limbed(blend: Blend) -> Limbed:
@@ -65,13 +66,13 @@ def limbed(blend: Blend) -> Limbed:
         away = np.linalg.norm(cones.start[first] - cones.end[end], axis=1)
         away[k] = np.inf
         free[cones.axis[end]] = away.min() > 1.5 * cones.high[end]
-    return Limbed(blend.kernel, free)
+    return Limbed(blend.kernel, kin_of(blend.limbs), free)
 
 
 @njit
 def _value(on: Any, x: Any, y: Any, z: Any, which: Any) -> Any:
-    """The implicit function as particle `on.number` sees it, and the cone nearest there."""
-    return value_around(on.field, on.around, on.number, on.reach, x, y, z, which)
+    """The implicit function as a particle sees it, and the cone nearest there."""
+    return value_around(on.field, on.kin, on.around, on.number, x, y, z, which)
 
 
 @njit
