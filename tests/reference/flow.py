@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from forest.surface.blend.field import Blend, cone, joint, smooth_least
+
 Point = Sequence[float]
 
 
@@ -85,3 +87,21 @@ def push(
         )
         for k in range(3)
     ]
+
+
+def seen(blend: Blend, axes: set[int], x: Point) -> tuple[float, int]:
+    """The surface of some limbs alone, and the nearest cone: all of it is looked at."""
+    field, cones, joints = blend.kernel, blend.limbs.cones, blend.limbs.joints
+    here = [k for k in range(len(cones.axis)) if cones.axis[k] in axes]
+    plain, which = min((cone(cones, k, *x)[0], k) for k in here)
+    best = plain
+    for place in range(len(joints.place) - 1):
+        least = math.inf
+        for j in range(joints.place[place], joints.place[place + 1]):
+            if axes.isdisjoint(cones.axis[joints.first[j]].tolist()):
+                continue
+            value, _, share = joint(field, j, *x)
+            if share > 0.0:
+                least = smooth_least(least, value, 0.3 * joints.thin[j] * share)
+        best = min(best, least)
+    return best, which

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from forest._threads import using_threads
 from forest.errors import InputError
+from forest.surface.blend.around import empty_around, gather, kin_of, value_around
 from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
 from forest.surface.flow import Flow, FlowRules, angle_to_limb, flow, grain
@@ -56,12 +57,13 @@ def test_relinking_is_table_2(n: int, limbs: int, seed: int, printed: bool) -> N
     ahead, behind = (np.arange(n) + 1) % n, (np.arange(n) - 1) % n
     links = {k: int(ahead[k]) for k in range(n)}
 
-    def goes_around(part: list[int], about: int) -> bool:
+    def goes_around(part: list[int]) -> bool:
         way = [place[k] for k in part]
-        return abs(slow.turns(way, foot[about], heading[about])) > 0.5
+        runs = [k for j, k in enumerate(part) if j == 0 or limb[k] != limb[part[j - 1]]]
+        return any(abs(slow.turns(way, foot[k], heading[k])) > 0.5 for k in runs)
 
     def allowed(one: list[int], other: list[int]) -> bool:
-        return printed or (goes_around(one, one[0]) and goes_around(other, other[0]))
+        return printed or (goes_around(one) and goes_around(other))
 
     for a in range(n):
         b = int(ahead[a])
@@ -163,6 +165,52 @@ def test_links_stay_between_their_limits(junction: tuple[Blend, Flow]) -> None:
             assert link.max() < 0.15 + 1e-9
             if len(part) > 6:
                 assert np.median(link) > 0.05
+
+
+def _crossing() -> Blend:
+    """Two limbs of one trunk, from far apart, that cross."""
+    return Blend.of(
+        limbs_of(
+            tree(
+                Limb(-1, 0, (0, 0, 0), (0, 0, 1.6), 0.1, 0.08),
+                Limb(0, 1, (0, 0, 0.4), (0.7, 0.0, 1.1), 0.04, 0.03),
+                Limb(0, 4, (0, 0, 1.0), (0.7, 0.02, 0.5), 0.04, 0.03),
+            )
+        )
+    )
+
+
+def test_limbs_that_cross_do_not_hold_the_chain() -> None:
+    blend = _crossing()
+    found = flow(blend)
+    assert found.relinked == 2
+    assert found.stuck == 0
+    place = found.trails.place
+    assert blend.value(place).min() > -0.0102 * 0.1  # no trail within the other's wood
+    last = found.chains[-1]
+    on = [set(part.tolist()) for part in np.split(last.limb, last.first[1:-1])]
+    assert sorted(on, key=min) == [{0}, {1}, {2}]
+
+
+def test_lists_give_the_surface_that_a_limb_sees() -> None:
+    rng = np.random.default_rng(8)
+    blend = _crossing()
+    kin = kin_of(blend.limbs)
+    pairs = [set(kin.other[kin.first[k] : kin.first[k + 1]].tolist()) for k in range(3)]
+    assert pairs == [{1, 2}, {0}, {0}]
+    around = empty_around(1)
+    cones = blend.limbs.cones
+    for _ in range(300):
+        k = int(rng.integers(len(cones.axis)))
+        axis = cones.axis[k]
+        middle = cones.start[k] + rng.random() * (cones.end[k] - cones.start[k])
+        middle = middle + rng.normal(0.0, 0.06, 3)
+        gather(blend.kernel, kin, around, 0, axis, *middle.tolist(), 0.05)
+        for _ in range(3):
+            x = (middle + rng.normal(0.0, 0.04, 3)).tolist()
+            got, which = value_around(blend.kernel, kin, around, 0, *x, k)
+            expected, nearest = slow.seen(blend, {int(axis)} | pairs[axis], x)
+            assert (got, which) == (expected, nearest)
 
 
 def test_grain_follows_the_branches(junction: tuple[Blend, Flow]) -> None:

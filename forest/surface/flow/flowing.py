@@ -14,6 +14,7 @@ from forest.surface.blend.whole import READINGS
 from forest.surface.flow.chain import (
     DONE,
     FLOWING,
+    LEAST_LOOP,
     Chain,
     Forces,
     advance,
@@ -32,8 +33,11 @@ _Ints = NDArray[np.int64]
 RECORD_EVERY = 5
 #: The chain is stuck when it moves slower than this share of the speed at which it started.
 _STUCK = 0.02
-#: The flow ends when it takes so many times as long as straight to the farthest tip.
-_PATIENCE = 4.0
+#: The flow ends when it takes so many times as long as straight to the farthest tip, or so many
+#: times the steps of particles that rings about all limbs would: then chains hang in crotches.
+_PATIENCE, _EFFORT = 8.0, 3.0
+#: Points of trails so far within the wood, in radii of the limb, lie where limbs cross.
+_WITHIN = 0.01
 #: Height of the ring at the start above the ground, units.
 _START = 0.1
 
@@ -259,6 +263,17 @@ def _loops(chain: Chain, time_s: float) -> Loops:
     return Loops(time_s, chain.place[order].copy(), chain.limb[order].copy(), np.array(first))
 
 
+def _effort(surface: Limbed, rules: FlowRules, unit: float) -> float:
+    """Count the steps of particles that a ring about each limb takes from its base to its tip."""
+    cones = surface.field.cones
+    length = np.linalg.norm(cones.end - cones.start, axis=1)
+    radius = 0.5 * (cones.low + cones.high)
+    finer = np.minimum(1.0, rules.finest_link * radius / (rules.greatest_link * unit))
+    link = 0.5 * (rules.greatest_link + rules.least_link) * unit * finer
+    steps = length * rules.steps_per_s / (rules.speed * unit)
+    return float(np.sum(steps * np.maximum(LEAST_LOOP, 2.0 * math.pi * radius / link)))
+
+
 def flow(
     blend: Blend,
     *,
@@ -313,9 +328,12 @@ def flow(
     shown = [_loops(chain, 0.0)]
     trails.take(chain, 0.0)
     done, next_show = 0, show_every_s
-    while done < longest * rules.steps_per_s:
+    bounded = seconds is None and rules.steering > 0.0  # momentum alone takes its time
+    effort = _EFFORT * _effort(surface, rules, unit) if bounded else math.inf
+    while done < longest * rules.steps_per_s and effort > 0.0:
         taken, flowing = advance(surface, chain, forces, np.int64(RECORD_EVERY))
         done += taken
+        effort -= taken * flowing
         if taken < RECORD_EVERY and flowing:
             chain = with_room(chain, 2 * len(chain.live))
             continue
@@ -328,7 +346,7 @@ def flow(
                 break
     live = chain.live[: chain.tally[1]]
     return Flow(
-        trails=trails.trails(chain),
+        trails=trails.trails(chain, blend),
         unit_m=unit,
         relinked=int(chain.tally[2]),
         stuck=int(np.count_nonzero(chain.state[live] != DONE)),
@@ -351,6 +369,7 @@ class _Recorder:
         self._place: list[_Floats] = []
         self._limb: list[NDArray[np.int32]] = []
         self._off: list[_Floats] = []
+        self._radius: list[_Floats] = []
         self._time: list[float] = []
         self._ended = np.zeros(0, np.bool_)
 
@@ -366,12 +385,15 @@ class _Recorder:
         self._place.append(chain.place[live])
         self._limb.append(chain.limb[live])
         self._off.append(chain.off[live])
+        self._radius.append(chain.radius[live])
         self._time.append(time_s)
 
-    def trails(self, chain: Chain) -> Trails:
+    def trails(self, chain: Chain, blend: Blend) -> Trails:
         number = np.concatenate(self._number)
         time = np.repeat(self._time, [len(part) for part in self._number])
+        inside = blend.value(np.concatenate(self._place)) / np.concatenate(self._radius) < -_WITHIN
         order = np.argsort(number, kind="stable")  # by particle, then by time
+        order = order[~inside[order]]
         number = number[order]
         names, first = np.unique(number, return_index=True)
         return Trails(
