@@ -1,4 +1,4 @@
-"""The surface as something sees it that creeps over one limb: that limb and those that start with it.
+"""The surface as seen by what creeps over one limb: that limb and those that start with it.
 
 Limbs that cross elsewhere are not seen; what creeps goes through their wood. And a walk through
 the trees of boxes costs more than the few cones and joints that it finds, so that they are kept, as
@@ -53,7 +53,7 @@ class Around(NamedTuple):
 
     cones: NDArray[np.int32]  # (n, ROOM)
     joints: NDArray[np.int32]  # (n, ROOM) twice the joint, and 1 more for the first of a place
-    count: NDArray[np.int32]  # (n, 2) cones and joints; below 0: too many
+    held: NDArray[np.int32]  # (n, 2) cones and joints; below 0: too many
     middle: NDArray[np.float64]  # (n, 3) where they were gathered
     reach: NDArray[np.float64]  # (n,) how far from there they hold, m
     axis: NDArray[np.int32]  # (n,) the limb for which; -1: for none yet
@@ -64,7 +64,7 @@ def empty_around(room: int) -> Around:
     return Around(
         cones=np.zeros((room, ROOM), np.int32),
         joints=np.zeros((room, ROOM), np.int32),
-        count=np.full((room, 2), -1, np.int32),
+        held=np.full((room, 2), -1, np.int32),
         middle=np.zeros((room, 3)),
         reach=np.zeros(room),
         axis=np.full(room, -1, np.int32),
@@ -74,12 +74,10 @@ def empty_around(room: int) -> Around:
 @njit
 def _sees(kin: Any, axis: Any, other: Any) -> Any:
     """Whether one limb is another, or joined to it."""
-    if axis == other:
-        return True
+    seen = axis == other
     for k in range(kin.first[axis], kin.first[axis + 1]):
-        if kin.other[k] == other:
-            return True
-    return False
+        seen = seen or kin.other[k] == other
+    return seen
 
 
 @njit
@@ -127,7 +125,10 @@ def _may_blend(field: Any, j: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
 def _gather_cones(
     field: Any, kin: Any, axis: Any, x: Any, y: Any, z: Any, reach: Any, row: Any
 ) -> Any:
-    """List the cones seen whose value can be least within the reach; gives how many, -1 if too many."""
+    """List the cones seen whose value can be least within the reach.
+
+    Gives how many; -1 if too many.
+    """
     count = 0
     node = np.int64(1)
     leaves = field.boxes.leaves[0]
@@ -155,7 +156,10 @@ def _gather_cones(
 def _gather_joints(
     field: Any, kin: Any, axis: Any, x: Any, y: Any, z: Any, reach: Any, row: Any
 ) -> Any:
-    """List the joints of limbs seen that can blend within the reach; gives how many, -1 if too many."""
+    """List the joints of limbs seen that can blend within the reach.
+
+    Gives how many; -1 if too many.
+    """
     count = 0
     joints = field.joints
     axes = field.cones.axis
@@ -194,8 +198,8 @@ def gather(
     """List for point n, on a limb, what matters within a reach, m, of a place."""
     cones = _gather_cones(field, kin, axis, x, y, z, reach, around.cones[n])
     joints = _gather_joints(field, kin, axis, x, y, z, reach, around.joints[n])
-    around.count[n, 0] = cones if joints >= 0 else -1
-    around.count[n, 1] = joints
+    around.held[n, 0] = cones if joints >= 0 else -1
+    around.held[n, 1] = joints
     around.middle[n, 0], around.middle[n, 1], around.middle[n, 2] = x, y, z
     around.reach[n] = reach
     around.axis[n] = axis
@@ -207,7 +211,7 @@ def _blend_around(field: Any, around: Any, n: Any, plain: Any, x: Any, y: Any, z
     best = plain
     here = np.inf
     moved = total = 0.0
-    for k in range(around.count[n, 1]):
+    for k in range(around.held[n, 1]):
         j = around.joints[n, k] // 2
         if around.joints[n, k] & 1:
             best = min(best, here)
@@ -230,11 +234,11 @@ def value_around(
 
     Where the lists of point n do not hold, they are gathered anew.
     """
-    while around.count[n, 0] >= 0:
+    while around.held[n, 0] >= 0:
         dx, dy, dz = x - around.middle[n, 0], y - around.middle[n, 1], z - around.middle[n, 2]
         best = np.inf
         which = np.int64(hint)
-        for k in range(around.count[n, 0]):
+        for k in range(around.held[n, 0]):
             i = np.int64(around.cones[n, k])
             one = cone(field.cones, i, x, y, z)[0]
             if one < best or (one == best and i < which):

@@ -95,8 +95,10 @@ def empty_chain(room: int) -> Chain:
 def with_room(chain: Chain, room: int) -> Chain:
     """Copy a chain into longer arrays."""
     longer = empty_chain(room)
-    for old, new in zip((*chain[:-1], *chain.around), (*longer[:-1], *longer.around), strict=True):
-        new[: len(old)] = old
+    old: list[NDArray[Any]] = [*chain[:-1], *chain.around]
+    new: list[NDArray[Any]] = [*longer[:-1], *longer.around]
+    for before, after in zip(old, new, strict=True):
+        after[: len(before)] = before
     return longer
 
 
