@@ -37,7 +37,7 @@ demo: $(READY)  ## grow the Saxony spruce stand for 60 years, print its table, d
 # takes a copy of that cache (tests/conftest.py).
 test: $(READY)  ## the ordinary tests, on two processes
 	@$(BIN)/python -m forest.warm
-	@$(BIN)/python -m pytest -q -n 2 --dist loadfile
+	@$(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 test-stand: $(READY)  ## tests on whole stands (minutes)
 	@$(BIN)/python -m forest.warm

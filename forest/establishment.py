@@ -18,6 +18,7 @@ from forest.yearbook import Event
 
 if TYPE_CHECKING:
     from forest.environment.obstacles import Solid
+    from forest.environment.surroundings import Surroundings
     from forest.growth.parameters import SpeciesTraits
     from forest.stand import Stand
 
@@ -78,14 +79,14 @@ def first_trees(stand: Stand) -> Newcomers:
     x, y, species = scenario.planting_positions()
     heading = headings(*scenario.planting_leans())
     if isinstance(scenario.planting, Explicit):
-        check_free(stand, x, y, where="planting.trees[{}]")
+        check_free(stand.surroundings, x, y, where="planting.trees[{}]")
         return Newcomers.planted(x, y, species, heading)
     free = ~stand.surroundings.blocked(x, y)
     return Newcomers.planted(x[free], y[free], species[free], heading[free])
 
 
 def check_free(
-    stand: Stand,
+    around: Surroundings,
     x: Sequence[float] | NDArray[Any],
     y: Sequence[float] | NDArray[Any],
     *,
@@ -96,7 +97,7 @@ def check_free(
 
     Parameters
     ----------
-    stand : Stand
+    around : Surroundings
     x, y : sequence of n floats
         Places, m.
     where : str
@@ -104,7 +105,7 @@ def check_free(
     solid : Solid, optional
         What obstacles that are to come fill; default: those that stand.
     """
-    blocked = stand.surroundings.blocked(np.asarray(x), np.asarray(y), solid)
+    blocked = around.blocked(np.asarray(x), np.asarray(y), solid)
     if blocked.any():
         k = int(np.flatnonzero(blocked)[0])
         raise InputError(
@@ -129,7 +130,7 @@ def plant(
     width, depth = stand.scenario.plot.size_m
     check_planting(*at, names, (width, depth), stand.species_names)
     leans = check_leans(len(x), lean_deg, lean_azimuth_deg)
-    check_free(stand, *at, where="Stand.plant")
+    check_free(stand.surroundings, *at, where="Stand.plant")
     if stand.scenario.plot.boundary == "periodic":
         at = at[0] % width, at[1] % depth
     codes = np.array([stand.species_names.index(name) for name in names], np.int16)

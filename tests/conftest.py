@@ -25,6 +25,24 @@ settings.register_profile("ci", settings.get_profile("here"), derandomize=True, 
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
 
+@pytest.fixture
+def three_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a test ask for up to three threads, on however few the other tests run."""
+    monkeypatch.setenv("FOREST_THREADS", "3")
+
+
+#: Files that take longest are begun first, so that no worker is left alone with one in the end;
+#: those that wait for a browser or for processes stand beside others that compute.
+_FIRST = ("viewer/test_live.py", "test_sweep.py", "viewer/test_page.py", "scenario/test_trials.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of long files first (see the Makefile: files are dealt in this order)."""
+    here = Path(__file__).parent
+    rank = {here / name: k for k, name in enumerate(_FIRST)}
+    items.sort(key=lambda item: rank.get(item.path, len(rank)))
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let the expectations of tests/golden be rewritten, for a reason that they keep."""
     parser.addoption(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from forest.scenario import Scenario
 from forest.simulation import simulate
 from forest.stand import Stand
 from tests.everything import TOML, VARIANTS, YEARS, everything
+from tests.forks import run_and_die
 from tests.tiny import assert_same_runs, assert_same_state, assert_same_years, steps
 
 SCENARIOS = sorted(
@@ -142,32 +141,12 @@ def test_same_on_threads(
         assert_same_runs(straight, other)
 
 
-DIES = """
-import os, signal, sys, threading, time
-from forest.scenario import Scenario
-from forest.progress import Silent
-from forest.simulation import simulate
-
-class Dies(Silent):
-    def begin(self, years, done):
-        self.last = time.monotonic()
-    def year_done(self, stand):
-        took, self.last = time.monotonic() - self.last, time.monotonic()
-        if stand.year == int(sys.argv[3]):
-            threading.Timer(0.5 * took, os.kill, (os.getpid(), signal.SIGKILL)).start()
-
-simulate(Scenario.load(sys.argv[1]), sys.argv[2], resume=True, progress=Dies())
-"""
-
-
 def test_same_killed_twice(variant: str, straight: Run, tmp_path: Path) -> None:
     """SIGKILL in the year after 2005 and after 2010; some years are grown again, two to four."""
     scenario, out = tmp_path / "everything.toml", tmp_path / "run.h5"
     scenario.write_text(everything(*VARIANTS[variant]).to_toml())
-    for year in ("2005", "2010"):
-        words = [sys.executable, "-c", DIES, scenario, out, year]
-        child = subprocess.run(words, capture_output=True, text=True, check=False)
-        assert child.returncode == -signal.SIGKILL, child.stderr
+    for year in (2005, 2010):
+        assert run_and_die(scenario, out, after=year, share=0.5) == -signal.SIGKILL
     with open_run(out) as cut:
         assert 2010 <= cut.years[-1] < 2014
     with simulate(Scenario.load(scenario), out, resume=True) as run:

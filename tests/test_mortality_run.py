@@ -101,6 +101,7 @@ def test_info_tells_the_causes(run: Run) -> None:
         assert name in text
 
 
+@pytest.mark.usefixtures("three_threads")
 def test_same_bits_on_threads_and_resumed(run: Run, tmp_path: Path) -> None:
     with simulate(tiny(*RULES), tmp_path / "two.h5", threads=2) as two:
         assert_same_runs(run, two)

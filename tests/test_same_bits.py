@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +12,7 @@ from forest.record.checkpoint import latest_checkpoint, write_checkpoint
 from forest.record.run import Run, open_run
 from forest.simulation import simulate
 from forest.stand import Stand
+from tests.forks import run_and_die
 from tests.tiny import (
     YEARS,
     assert_same_runs,
@@ -55,6 +53,7 @@ def test_run_twice(straight: Run, tmp_path: Path) -> None:
     assert not straight.rings.empty
 
 
+@pytest.mark.usefixtures("three_threads")
 def test_two_threads(straight: Run, tmp_path: Path) -> None:
     assert_same_runs(straight, simulate(tiny(), tmp_path / "run.h5", threads=2))
 
@@ -80,27 +79,6 @@ def test_more_years_later(straight: Run, tmp_path: Path, first: int) -> None:
         assert [session["years_before"] for session in run.provenance["sessions"]] == [0, first]
 
 
-DIES = """
-import os, signal, sys, threading, time
-from pathlib import Path
-from forest.scenario import Scenario
-from forest.progress import Silent
-from forest.simulation import simulate
-
-class Dies(Silent):
-    def begin(self, years, done):
-        self.after, self.last = done + 2, time.monotonic()
-    def year_done(self, stand):
-        took, self.last = time.monotonic() - self.last, time.monotonic()
-        if stand.steps == self.after:
-            moment = float(sys.argv[3]) * took
-            threading.Timer(moment, os.kill, (os.getpid(), signal.SIGKILL)).start()
-
-simulate(Scenario.load(sys.argv[1]).with_overrides(["output.checkpoint_every_years=1"]),
-         sys.argv[2], resume=True, progress=Dies())
-"""
-
-
 @pytest.mark.parametrize("mechanics", ["", "mechanics={}"])
 def test_killed_and_resumed(straight: Run, tmp_path: Path, mechanics: str) -> None:
     """SIGKILL somewhere in a year, in its record or its checkpoint; three times."""
@@ -108,18 +86,12 @@ def test_killed_and_resumed(straight: Run, tmp_path: Path, mechanics: str) -> No
     if mechanics:
         straight = simulate(tiny(mechanics), tmp_path / "straight.h5", threads=1)
     out = tmp_path / "run.h5"
-    scenario = tmp_path / "scenario.toml"
-    scenario.write_text(tiny(*changes).to_toml())
-    for moment in ("0.05", "0.5", "0.9"):
-        child = subprocess.run(
-            [sys.executable, "-c", DIES, scenario, out, moment],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert child.returncode in (-signal.SIGKILL, 0), child.stderr
-    assert latest_checkpoint(out) is not None
     every = "output.checkpoint_every_years=1"
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text(tiny(every, *changes).to_toml())
+    for year, moment in ((2002, 0.05), (2004, 0.5), (2006, 0.9)):
+        run_and_die(scenario, out, after=year, share=moment)
+    assert latest_checkpoint(out) is not None
     with simulate(tiny(every, *changes), out, resume=True) as run:
         assert len(run.provenance["sessions"]) > 1
         assert_same_runs(straight, run)

@@ -9,16 +9,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from forest.cli.shared import RunFile, check_targets, options_named
+from forest.cli.shared import RunFile, check_targets, given_options, options_named
 
 if TYPE_CHECKING:
-    from forest.view.movie import FilmSettings
+    from forest.view.film import FilmSettings
 
 _USUAL_FPS = {".mp4": 20.0, ".gif": 10.0}
 _STAND_SIZE, _TREE_SIZE = "960x600", "600x720"
 
 
+_OF_A_TREE = ("--year", "--grow", "--shape", "--leaves")
+_OF_A_STAND = ("--from-year", "--to-year", "--colour", "--view")
+
+
 def movie(
+    context: typer.Context,
     run_file: RunFile,
     to: Annotated[Path, typer.Option("--to", metavar="FILE.mp4|.gif", help="The film.")],
     tree: Annotated[
@@ -71,10 +76,11 @@ def movie(
 
     check_targets((to, SUFFIXES), force=force)
     settings = _settings(to, fps, seconds, size or (_STAND_SIZE if tree is None else _TREE_SIZE))
-    if tree is None and (year is not None or grow or shape != "skeleton"):
-        raise InputError("--year, --grow and --shape are for films of a tree", expected="--tree ID")
-    if tree is not None and (from_year is not None or to_year is not None):
-        raise InputError("--from-year and --to-year are for films of a stand", expected="--year")
+    refused, what = (_OF_A_STAND, "a stand") if tree is not None else (_OF_A_TREE, "a tree")
+    for option in given_options(context):
+        if option in refused:
+            instead = "no --tree" if tree is not None else "--tree ID"
+            raise InputError(f"{option} is for films of {what}", expected=instead)
     options = {"from_year": "--from-year", "to_year": "--to-year"}
     with open_run(run_file) as run, options_named(**options), _frames_shown() as (begin, done):
         if tree is None:
@@ -144,7 +150,7 @@ def report(
 def _settings(to: Path, fps: float | None, seconds: float | None, size: str) -> FilmSettings:
     from forest.cli.viewing import pixels_of
     from forest.errors import InputError
-    from forest.view.movie import FilmSettings
+    from forest.view.film import FilmSettings
 
     fps = _USUAL_FPS[to.suffix.lower()] if fps is None else fps
     if not 0.5 <= fps <= 60.0:

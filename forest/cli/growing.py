@@ -177,6 +177,10 @@ def check(scenario: ScenarioFile, overrides: Overrides = None) -> None:
 
     asked = Scenario.load(scenario, overrides or ())
     lines = summary(asked)
+    if asked.obstacles or any(act.kind == "obstacle" for act in asked.acts):
+        from forest.management.places import check_places
+
+        check_places(asked)
     if asked.planting.kind == "inventory":
         from forest.stand import Stand
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from forest.stand import Stand
 
 #: Trees that die of these lie at once.
-_LYING_CAUSES = ("wind", "buckling")
+LYING_CAUSES = ("wind", "buckling")
 #: Felled trees that are left in the stand; all others are taken away.
 _LEFT_CAUSES = ("tending",)
 
@@ -186,7 +186,7 @@ class DeadWood:
         self.snags = self.snags.keep(~falls)
         dead = [death.row for death in deaths]
         stands = np.array(
-            [d.cause not in _LYING_CAUSES and measures.dbh_cm[d.row] > 0.0 for d in deaths],
+            [d.cause not in LYING_CAUSES and measures.dbh_cm[d.row] > 0.0 for d in deaths],
             np.bool_,
         )
         fresh = self._fresh(stand, np.array(dead, np.int64), measures)

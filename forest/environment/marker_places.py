@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.environment.marker_buds import list_buds
 from forest.environment.marker_tiles import EDGE, cell_words, inside, jitter
 from forest.environment.markers import MarkerSpace
+from forest.trees.metamers import Metamers
+from forest.trees.table import Trees
 
 
 def free_markers(
@@ -70,3 +73,41 @@ def _word(gone: NDArray[np.generic], tile: NDArray[np.int64]) -> int:
     if gone.size == 0 or np.any(tile < 0) or np.any(tile >= gone.shape):
         return 0
     return int(gone[tuple(tile)])
+
+
+def occupied(
+    points: NDArray[np.float64],
+    metamers: Metamers,
+    trees: Trees,
+    occupancy_m: NDArray[np.floating],
+    wraps_m: tuple[float, float] | None,
+) -> NDArray[np.bool_]:
+    """Tell which points lie in the occupancy zone of a living bud, as it is now.
+
+    Parameters
+    ----------
+    points : float64 (n, 3)
+        m; inside the plot where it wraps.
+    metamers, trees
+        The stand.
+    occupancy_m : float (species,)
+        Radius of the zone around a bud of each species.
+    wraps_m : (float, float), optional
+        Sides of a periodic plot.
+    """
+    from scipy.spatial import cKDTree
+
+    buds = list_buds(metamers, trees)
+    taken = np.zeros(len(points), np.bool_)
+    box = None if wraps_m is None else (*wraps_m, 0.0)
+    for species, radius in enumerate(occupancy_m):
+        places = buds.position[buds.species == species]
+        if box is not None:
+            places[:, :2] %= wraps_m
+            places[:, :2][places[:, :2] >= wraps_m] = 0.0  # a rounded-up remainder
+        rest = np.flatnonzero(~taken)
+        if len(places) and len(rest):
+            bound = np.nextafter(float(radius), np.inf)  # the zone's edge belongs to it
+            away, _ = cKDTree(places, boxsize=box).query(points[rest], distance_upper_bound=bound)
+            taken[rest[np.isfinite(away)]] = True
+    return taken

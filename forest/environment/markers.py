@@ -142,9 +142,11 @@ class MarkerSpace:
         self._points = np.zeros((0, 3))
         self._due = np.zeros(0, np.int32)
         self._cloud_gone = np.zeros(0, np.uint8)
+        self._fresh: list[tuple[NDArray[np.float64], NDArray[np.int32]]] = []
         self._clouds = 0
         if clouds is not None and len(clouds):
             self.lay(clouds, np.zeros(len(clouds), np.int32))
+            self._gather()
             self._clouds = len(self._points)
 
     @property
@@ -170,6 +172,7 @@ class MarkerSpace:
     @property
     def cloud(self) -> NDArray[np.float64]:
         """Explicit markers, float64 (n, 3), m."""
+        self._gather()
         return self._points.copy()
 
     def lay(self, points: NDArray[np.float64], due: NDArray[np.int32]) -> None:
@@ -186,13 +189,22 @@ class MarkerSpace:
         if self._cells[0]:
             new[:, :2] %= self._size
             new[:, :2][new[:, :2] >= self._size] = 0.0  # a rounded-up remainder
-        self._points = np.concatenate((self._points, new))
-        self._due = np.concatenate((self._due, due.astype(np.int32)))
-        self._cloud_gone = np.concatenate((self._cloud_gone, np.zeros(len(new), np.uint8)))
+        self._fresh.append((new, due.astype(np.int32)))
+
+    def _gather(self) -> None:
+        """Put what was laid since the last time behind the rest: one copy for many strokes."""
+        if self._fresh:
+            points, due = zip(*self._fresh, strict=True)
+            self._fresh = []
+            self._points = np.concatenate((self._points, *points))
+            self._due = np.concatenate((self._due, *due))
+            none = np.zeros(len(self._due) - len(self._cloud_gone), np.uint8)
+            self._cloud_gone = np.concatenate((self._cloud_gone, none))
 
     @property
     def laid(self) -> Laid:
         """The markers that were laid since the start, in the order in which they were."""
+        self._gather()
         n = self._clouds
         return Laid(self._points[n:], self._due[n:], self._cloud_gone[n:] != 0)
 
@@ -232,6 +244,7 @@ class MarkerSpace:
         BudSpace
             What each living bud found. `marker_buds.apply_space` writes it into the arena.
         """
+        self._gather()
         buds = list_buds(metamers, trees)
         sites = _sites(species)
         n = len(buds.species)
@@ -254,6 +267,7 @@ class MarkerSpace:
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Give the arrays that the next year needs beside the stand (empty with `release`)."""
+        self._gather()
         state: dict[str, NDArray[np.generic]] = {
             "gone": self._gone.copy(),
             "gone_low": self._gone_low.copy(),
@@ -266,6 +280,7 @@ class MarkerSpace:
 
     def restore(self, state: Mapping[str, NDArray[np.generic]]) -> None:
         """Take back what `state` gave."""
+        self._gather()
         if "laid" in state:
             n = self._clouds
             self._points = np.concatenate((self._points[:n], np.array(state["laid"], np.float64)))

@@ -20,6 +20,7 @@ from forest.environment.canopy import Canopy
 from forest.environment.dormant import Hold
 from forest.environment.exposure import CanopySpec, Light, LightSpecies, ShadowSpec
 from forest.environment.marker_buds import BudSpace, apply_space
+from forest.environment.marker_places import occupied
 from forest.environment.markers import Envelope, MarkerSpace, MarkerSpecies
 from forest.environment.obstacles import Box, Mesh, Solid, solid_places
 from forest.environment.plant_area import PlantArea
@@ -98,6 +99,7 @@ class Surroundings:
             voxel_m=self.voxel_m,
             full_light=self.full_light,
         )
+        self._wraps_m = size_m if periodic else None
         self.build(scenario.obstacles)
         self._markers: MarkerSpace | None = None
         if spec.markers is not None:
@@ -209,6 +211,14 @@ class Surroundings:
         """
         rendered = self._rendered or self._make_rendered(solid=self._light.solid)
         return rendered.picture(metamers, trees, step, number)
+
+    def occupied(
+        self, points: NDArray[np.float64], metamers: Metamers, trees: Trees
+    ) -> NDArray[np.bool_]:
+        """Tell which places of markers (n, 3), m, lie in a living bud's occupancy zone now."""
+        return occupied(
+            points, metamers, trees, self._marker_species.occupancy_radius_m, self._wraps_m
+        )
 
     @property
     def markers(self) -> MarkerSpace | None:

@@ -117,7 +117,7 @@ def settle(
     """
     scenario = stand.scenario
     x, y, species = scenario.planting_positions()
-    check_free(stand, x, y, where="planting.trees[{}]")
+    check_free(stand.surroundings, x, y, where="planting.trees[{}]")
     rows = seedlings(
         x,
         y,

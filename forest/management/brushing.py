@@ -196,7 +196,7 @@ class Brush:
         free = outside(around.solid, points, around.voxel_m)
         around.markers.lay(points[free], (first + part[free]).astype(np.int32))
         stroke, hold = drawn.stroke, drawn.hold or Hold(_NO_TREE, 0)
-        end = len(around.markers.laid.due)
+        end = (self._records[-1].end if self._records else 0) + int(free.sum())
         record = _Record(first, stroke.steps, stroke.hold_steps, *hold, end)
         self._records.append(record)
         return number
@@ -224,7 +224,7 @@ class Brush:
 
         `markers` counts those of all its parts, `laid` those of the parts so far, `colonised` the
         laid ones that are taken for good: they lay in the occupancy zone of a bud. Where markers
-        are released nothing is taken for good, and it is -1.
+        are released nothing is taken for good, and counted are those that lie in one now.
         """
         space, start = stand.surroundings.markers, stand.scenario.start_year
         rows = self._records
@@ -242,9 +242,14 @@ class Brush:
         columns["laid"] = columns["colonised"] = []
         if space is not None:
             laid = space.laid
-            columns["laid"] = [int((laid.due[span] <= stand.steps).sum()) for span in spans]
-            gone = [-1 if space.release else int(laid.gone[span].sum()) for span in spans]
-            columns["colonised"] = gone
+            there = laid.due <= stand.steps
+            taken = laid.gone
+            if space.release:
+                taken = there & stand.surroundings.occupied(
+                    laid.point, stand.arena.metamers, stand.rows
+                )
+            columns["laid"] = [int(there[span].sum()) for span in spans]
+            columns["colonised"] = [int(taken[span].sum()) for span in spans]
         return columns
 
     def state(self) -> dict[str, NDArray[Any]]:

@@ -332,7 +332,8 @@ def _places(
 ) -> Places:
     solid = plan.solid(stand)
     if act.pattern is None:
-        check_free(stand, act.x_m, act.y_m, where=where.format("x_m[{}]"), solid=solid)
+        where = where.format("x_m[{}]")
+        check_free(stand.surroundings, act.x_m, act.y_m, where=where, solid=solid)
         return Places(act.x_m, act.y_m, act.names(stand.species_names))
     planned = list(plan.plantings.values())
     x = np.concatenate([census.x[standing], *(np.asarray(p.x, np.float64) for p in planned)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,45 @@ _TICK_MS = 10  # a .gif counts in hundredths of a second
 
 Frame = NDArray[np.uint8]
 _Tell = Callable[[], object]
+
+
+MOST_FRAMES = 20_000
+
+
+@dataclass(frozen=True)
+class FilmSettings:
+    """How a film is made.
+
+    Attributes
+    ----------
+    fps : float
+        Frames per second.
+    seconds : float, optional
+        How long it lasts; by the number of years if not given.
+    size : (int, int)
+        Width and height, pixels.
+    """
+
+    fps: float = 20.0
+    seconds: float | None = None
+    size: tuple[int, int] = (960, 600)
+
+    def count(self, usual_seconds: float) -> int:
+        """Count the frames.
+
+        Raises
+        ------
+        InputError
+            If there would be more than `MOST_FRAMES`.
+        """
+        seconds = usual_seconds if self.seconds is None else self.seconds
+        frames = max(2, round(seconds * self.fps))
+        if frames > MOST_FRAMES:
+            raise InputError(
+                f"{seconds:g} s at {self.fps:g} frames per second are {frames:,} frames",
+                expected=f"{MOST_FRAMES:,} at most",
+            )
+        return frames
 
 
 def check_film(to: Path, size: tuple[int, int]) -> None:
@@ -61,6 +101,7 @@ def write_film(
     *,
     fps: float,
     overwrite: bool = False,
+    begin: Callable[[int], object] = lambda count: None,
     done: _Tell = lambda: None,
 ) -> None:
     """Render frames and write them as a film.
@@ -78,8 +119,8 @@ def write_film(
         Frames per second.
     overwrite : bool
         Whether to replace a file.
-    done : callable
-        Called after each frame.
+    begin, done : callable
+        Told the number of frames; called after each of them.
 
     Raises
     ------
@@ -89,6 +130,7 @@ def write_film(
         If it cannot be written. Nothing half-written is left behind.
     """
     to = Path(to)
+    begin(count)
     first = frame(0)
     check_film(to, (first.shape[1], first.shape[0]))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,54 +11,17 @@ from numpy.typing import NDArray
 from forest.errors import InputError
 from forest.record.run import Run
 from forest.view.bodies_picture import Stage
-from forest.view.film import check_film, write_film
+from forest.view.film import FilmSettings, check_film, write_film
 from forest.view.overlay import Overlay, stage_size
 from forest.view.stand_years import FATES, StandYears, conifers_of
+from forest.view.standing import SNAG
 from forest.view.tree_colours import TreeColours
-
-MOST_FRAMES = 20_000
 
 _SECONDS_PER_YEAR = 0.35
 _USUAL_SECONDS = (4.0, 15.0)
 _TURN_SECONDS = 6.0  # of a stand with one year on file
 
 _Done = Callable[[int], object]
-
-
-@dataclass(frozen=True)
-class FilmSettings:
-    """How a film is made.
-
-    Attributes
-    ----------
-    fps : float
-        Frames per second.
-    seconds : float, optional
-        How long it lasts; by the number of years if not given.
-    size : (int, int)
-        Width and height, pixels.
-    """
-
-    fps: float = 20.0
-    seconds: float | None = None
-    size: tuple[int, int] = (960, 600)
-
-    def count(self, usual_seconds: float) -> int:
-        """Count the frames.
-
-        Raises
-        ------
-        InputError
-            If there would be more than `MOST_FRAMES`.
-        """
-        seconds = usual_seconds if self.seconds is None else self.seconds
-        frames = max(2, round(seconds * self.fps))
-        if frames > MOST_FRAMES:
-            raise InputError(
-                f"{seconds:g} s at {self.fps:g} frames per second are {frames:,} frames",
-                expected=f"{MOST_FRAMES:,} at most",
-            )
-        return frames
 
 
 def film_stand(
@@ -78,7 +40,8 @@ def film_stand(
     """Write a film of a run: its years go by evenly, and the last stays for a moment.
 
     Between the ends of two years, sizes lie on a line. Trees that die, are felled or thrown in a
-    year are seen once more in that year's frames, in a colour of their own.
+    year are seen once more in that year's frames, in a colour of their own, as they go. Residual
+    trees, snags and obstacles stand where they are on record.
 
     Parameters
     ----------
@@ -123,22 +86,24 @@ def film_stand(
     moments = _moments(first, last, count, settings.fps)
     overlay = Overlay(settings.size, colours, *_told(run, first, last))
     tall = run.read("trees", ["height_m"], years=(first, last))["height_m"].to_numpy(np.float64)
+    others = years.others(first)["height_m"].to_numpy(np.float64)
     stage = Stage(
         run.scenario.plot.size_m,
-        float(np.nanmax(tall, initial=0.0)),
+        float(np.nanmax(np.concatenate((tall, others)), initial=0.0)),
         window=stage_size(settings.size),
         view=view,
-        conifers=conifers_of(run),
+        conifers=conifers_of(run.scenario),
     )
 
     def frame(k: int) -> NDArray[np.uint8]:
         since = moments[k - 1] if k else float(first)
         trees = years.at(moments[k], since)
-        return overlay.beside(stage.picture(trees, colours, k / count), moments[k])
+        obstacles = years.obstacles(int(np.ceil(moments[k])))
+        picture = stage.picture(trees, colours, k / count, obstacles)
+        return overlay.beside(picture, moments[k])
 
-    begin(count)
     with stage:
-        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, done=done)
+        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done)
     return count
 
 
@@ -158,4 +123,6 @@ def _told(run: Run, first: int, last: int) -> tuple[object, tuple[str, ...]]:
     seen: set[str] = set()
     if "events" in run.tables and last > first:
         seen = set(run.read("events", ["kind"], years=(first + 1, last))["kind"].astype(str))
-    return stand, tuple(fate for fate in FATES if fate in seen)
+    if run.scenario.mortality.snags and "died" in seen:
+        seen.add(SNAG)
+    return stand, tuple(fate for fate in (*FATES, SNAG) if fate in seen)

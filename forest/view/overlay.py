@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from forest.view.bodies_picture import AROUND
 from forest.view.looks import look_of
-from forest.view.tree_colours import FATE_COLOURS, SCALES, TreeColours, on_scale
+from forest.view.tree_colours import FATE_COLOURS, RESIDUAL, SCALES, TreeColours, on_scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,6 +127,8 @@ class Overlay:
         named: Mapping[str, Any] = {fate: FATE_COLOURS[fate] for fate in fates}
         if colours.by == "species":
             species = {name.replace("_", " "): look_of(name).line for name in colours.species}
+            if colours.residual:
+                species["residual tree"] = RESIDUAL
             named = {**species, **named}
         else:
             self._add_scale(figure, colours, points)

@@ -54,12 +54,13 @@ class Blades(shapes.Leaves):
         """Area of each rhombus, m2."""
         return np.asarray(0.5 * np.linalg.norm(self.along, axis=1) * self.width)
 
-    def cards(self, scale: float) -> NDArray[np.float64]:
-        """Give the corners (n, 4, 3), enlarged by `scale`."""
+    def cards(self, scale: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Give the corners (n, 4, 3), enlarged by `scale`, and the number of each."""
         side = np.cross(self.along, self.normal)
         side *= (0.5 * scale * self.width / np.linalg.norm(side, axis=1))[:, None]
         tip, middle = self.place + scale * self.along, self.place + 0.5 * scale * self.along
-        return np.stack((self.place, middle - side, tip, middle + side), axis=1)
+        corners = np.stack((self.place, middle - side, tip, middle + side), axis=1)
+        return corners, np.arange(len(corners))
 
 
 def has_leaves(tree: ParametricTree, season: str) -> bool:
@@ -317,6 +318,7 @@ def _blades(tree: ParametricTree, season: str) -> tuple[Blades, float]:
         along=some.direction * some.length[:, None],
         colour=grain[:, None] * leaf_colour(tree.parameters, season),
         needles=np.zeros(len(chosen), np.bool_),
+        blades=1,
         normal=some.normal.astype(np.float64),
         width=some.width,
     )

@@ -18,7 +18,7 @@ from forest.view.shapes import gather_leaves, gather_wood, polylines
 
 _MOST_TUBES = 150_000  # internodes drawn as tubes, the thickest first
 _MOST_TWIGS = 700_000  # internodes drawn as lines
-_MOST_CARDS = 800_000
+_MOST_CARDS = 1_200_000
 #: Pixels are rendered so many times as fine along each side, and averaged.
 OVERSAMPLING = 2
 _HALF_VIEW_DEG = 13.0
@@ -117,15 +117,15 @@ class Scene:
 
     def _add_cards(self, plotter: Any) -> None:
         pv = import_pyvista()
-        corners = self.leaves.cards(self.card_scale)
+        corners, site = self.leaves.cards(self.card_scale)
         n = len(corners)
         faces = np.column_stack((np.full(n, 4), np.arange(4 * n).reshape(n, 4))).ravel()
         mesh = pv.PolyData(corners.reshape(-1, 3).astype(np.float32), faces)
         normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         facing = 0.55 + 0.45 * np.abs(normal @ SUN)  # leaves also let light through
-        sun, sky = self.light.at(self.leaves.place)
-        mesh.cell_data["rgb"] = shade(self.leaves.colour, sun * facing, sky)
+        sun, sky = (light[site] for light in self.light.at(self.leaves.place))
+        mesh.cell_data["rgb"] = shade(self.leaves.colour[site], sun * facing, sky)
         plotter.add_mesh(mesh, scalars="rgb", rgb=True, lighting=False)
 
 

@@ -13,6 +13,15 @@ from forest.view.looks import look_of
 
 _GOLDEN = 0.6180339887498949
 
+# Sizes of cards, for an internode of length 1.
+_LEAF_LENGTH, _LEAF_AREA = 1.1, 0.495
+_BRUSH_LENGTH, _BRUSH_AREA = 2.2, 0.8  # length of a site's only blade; area of all of them
+_BLADES = (2, 14)  # least and most that stand for the needles of a site
+_TWIG = np.array([0.38, 0.29, 0.22])  # colour of the thinnest wood, whatever its species
+_OLD_M = 0.02  # radius from which wood has its species' bark
+_SHOOT = 0.8  # brightness of a shoot among its needles, of theirs
+_SLANT = np.radians(32.0)  # between shoot and needle
+
 
 @dataclass(frozen=True)
 class Wood:
@@ -58,7 +67,11 @@ def gather_wood(skeletons: Sequence[Skeleton]) -> Wood:
         follows[1:] = (tree.parent[by_axis[1:]] == by_axis[:-1]) & (
             tree.axis[by_axis[1:]] == tree.axis[by_axis[:-1]]
         )
-        bark = np.broadcast_to(look_of(tree.species).bark, (len(by_axis), 3))
+        look = look_of(tree.species)
+        old = np.clip(tree.radius[by_axis, None] / _OLD_M, 0.0, 1.0)
+        bark = old * np.array(look.bark) + (1.0 - old) * _TWIG
+        if look.needles:  # which hide the shoot that bears them
+            bark = np.where(tree.leafy[by_axis, None], _SHOOT * np.array(look.leaf), bark)
         parts.append((tree.start[by_axis], tree.end[by_axis], tree.radius[by_axis], follows, bark))
     if not parts:
         return Wood(
@@ -105,48 +118,79 @@ class Leaves:
     colour : float64 (n, 3)
         Colour in full light.
     needles : bool (n,)
-        Whether the foliage lies along the shoot.
+        Whether the foliage stands along the shoot, as needles do.
+    blades : int
+        Cards that stand for the needles of a site; the more, the finer they are.
     """
 
     place: NDArray[np.float64]
     along: NDArray[np.float64]
     colour: NDArray[np.float64]
     needles: NDArray[np.bool_]
+    blades: int
 
     @property
     def area(self) -> NDArray[np.float64]:
-        """Area of each card, m2."""
-        length, width = self._size()
-        return 0.5 * length * width
+        """Area of all cards of a site, m2."""
+        return np.asarray(np.where(self.needles, _BRUSH_AREA, _LEAF_AREA) * self._shoot() ** 2)
 
-    def _size(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        shoot = np.maximum(np.linalg.norm(self.along, axis=1), 1e-3)
-        return shoot * np.where(self.needles, 1.7, 1.1), shoot * np.where(self.needles, 0.75, 0.9)
+    def _shoot(self) -> NDArray[np.float64]:
+        return np.asarray(np.maximum(np.linalg.norm(self.along, axis=1), 1e-3))
 
-    def cards(self, scale: float) -> NDArray[np.float64]:
-        """Give the corners (n, 4, 3) of one rhombic card per site, enlarged by `scale`."""
-        n = len(self.place)
-        chance = np.modf(np.arange(1, n + 1)[:, None] * _GOLDEN * np.array([1.0, 5.0, 13.0]))[0]
+    def cards(self, scale: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Give rhombic cards enlarged by `scale`: their corners (m, 4, 3), and the site of each.
+
+        A broad-leaved site has one card of any direction at the internode's end. One with needles
+        has `blades` narrow ones, around the internode and slanting forwards like a bottle brush.
+        """
+        count = np.where(self.needles, self.blades, 1)
+        site = np.repeat(np.arange(len(count)), count)
+        nth = np.arange(len(site)) - np.repeat(np.cumsum(count) - count, count)
+        seed = (site + 1.0)[:, None] * _GOLDEN * np.array([1.0, 5.0, 13.0])
+        chance = np.modf(seed + nth[:, None] * _GOLDEN * np.array([1.0, 1.0, 0.0]))[0]
         turn = 2.0 * np.pi * chance[:, 0]
-        rise = 1.2 * chance[:, 1] - 0.5
-        outward = np.column_stack(
-            (np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise))
+        needle, shoot = self.needles[site], self._shoot()[site]
+        heading = self.along[site] / shoot[:, None]
+        axis = np.where(
+            needle[:, None], _slanting(heading, turn), _any_way(turn, 1.2 * chance[:, 1] - 0.5)
         )
-        shoot = self.along / np.maximum(np.linalg.norm(self.along, axis=1, keepdims=True), 1e-9)
-        axis = np.where(self.needles[:, None], shoot + 0.35 * outward, outward)
-        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
         spin = np.column_stack((np.cos(3.0 * turn), np.sin(3.0 * turn), 0.6 * chance[:, 2]))
         side = np.cross(axis, spin)
         side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
-        length, width = (scale * size[:, None] for size in self._size())
-        base = self.place - np.where(self.needles[:, None], 0.6 * axis * length, 0.0)
-        middle = base + 0.5 * axis * length
-        half = 0.5 * side * width
-        return np.stack((base, middle - half, base + axis * length, middle + half), axis=1)
+        brush = _BRUSH_LENGTH / np.sqrt(self.blades)
+        length = scale * shoot * np.where(needle, brush, _LEAF_LENGTH)
+        width = (
+            scale
+            * shoot
+            * np.where(
+                needle, 2.0 * _BRUSH_AREA / (self.blades * brush), 2.0 * _LEAF_AREA / _LEAF_LENGTH
+            )
+        )
+        back = np.where(needle, 1.0 - (nth + 0.5) / self.blades, 0.0)
+        base = self.place[site] - back[:, None] * self.along[site]
+        tip = base + length[:, None] * axis
+        middle, half = 0.5 * (base + tip), 0.5 * width[:, None] * side
+        return np.stack((base, middle - half, tip, middle + half), axis=1), site
+
+
+def _any_way(turn: NDArray[np.float64], rise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give unit vectors of these azimuths and rises."""
+    level = np.cos(rise)
+    return np.column_stack((np.cos(turn) * level, np.sin(turn) * level, np.sin(rise)))
+
+
+def _slanting(heading: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give unit vectors that slant away from unit vectors, turned so far around them."""
+    other = np.where(np.abs(heading[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    right = np.cross(heading, other)
+    right /= np.maximum(np.linalg.norm(right, axis=1, keepdims=True), 1e-9)
+    up = np.cross(right, heading)
+    around = np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up
+    return np.asarray(np.cos(_SLANT) * heading + np.sin(_SLANT) * around)
 
 
 def gather_leaves(skeletons: Sequence[Skeleton], most: int) -> tuple[Leaves, float]:
-    """Put all leafy sites into one list, or an even part of them if there are more than `most`.
+    """Put all leafy sites into one list, or an even part if they need more than `most` cards.
 
     Returns
     -------
@@ -154,8 +198,13 @@ def gather_leaves(skeletons: Sequence[Skeleton], most: int) -> tuple[Leaves, flo
     scale : float
         Factor on the cards' size that makes up for the sites left out.
     """
-    total = sum(int(tree.leafy.sum()) for tree in skeletons)
-    share = min(1.0, most / max(total, 1))
+    sites_of = [int(tree.leafy.sum()) for tree in skeletons]
+    total = sum(sites_of)
+    needles = sum(
+        n for n, tree in zip(sites_of, skeletons, strict=True) if look_of(tree.species).needles
+    )
+    blades = int(np.clip((most - total + needles) // max(needles, 1), *_BLADES))
+    share = min(1.0, most / max(total + (blades - 1) * needles, 1))
     columns: list[tuple[NDArray[np.float64], ...]] = []
     for tree in skeletons:
         sites = np.flatnonzero(tree.leafy)
@@ -174,6 +223,8 @@ def gather_leaves(skeletons: Sequence[Skeleton], most: int) -> tuple[Leaves, flo
             )
         )
     if not columns:
-        return Leaves(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool)), 1.0
-    leaves = Leaves(*(np.concatenate(column) for column in zip(*columns, strict=True)))
-    return leaves, float(np.sqrt(total / max(len(leaves.place), 1)))
+        none = np.empty((0, 3))
+        return Leaves(none, none, none, np.empty(0, bool), blades), 1.0
+    place, along, colour, needle = (np.concatenate(column) for column in zip(*columns, strict=True))
+    leaves = Leaves(place, along, colour, needle.astype(np.bool_), blades)
+    return leaves, float(np.sqrt(total / max(len(place), 1)))

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from forest.errors import InputError, span_of
 from forest.record.run import Run
+from forest.scenario.model import Obstacle
+from forest.view.standing import (
+    EVENT_COLUMNS,
+    PLACE_COLUMNS,
+    SNAG,
+    in_year,
+    obstacles_at,
+    residual_rows,
+    snags_of,
+    together,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from forest.scenario import Scenario
 
 #: Columns of `/trees` that bodies and their colours need.
 COLUMNS = (
@@ -38,14 +51,18 @@ _SIZES = (
     "lean_deg",
     "light",
 )
+_CACHED_YEARS = 64
 _RESIDUAL_CONIFERS = ("balsam_fir",)
 #: How a tree goes, as the events' kinds name it.
 FATES = ("died", "felled", "windthrown")
+_FALLING = ("felled", "windthrown")
+_FALLEN_DEG = 78.0
+_BARE = 0.25  # reach of a crown when its tree has died, of that before
 
 
-def conifers_of(run: Run) -> frozenset[str]:
-    """Name the conifers among a run's species, and among those of residual trees."""
-    grown = (s.name for s in run.scenario.species_list if s.group == "conifer")
+def conifers_of(scenario: Scenario) -> frozenset[str]:
+    """Name the conifers among a scenario's species, and among those of residual trees."""
+    grown = (s.name for s in scenario.species_list if s.group == "conifer")
     return frozenset((*grown, *_RESIDUAL_CONIFERS))
 
 
@@ -56,6 +73,8 @@ class StandYears:
     ----------
     run : Run
         An open run.
+    columns : tuple of str
+        Columns of `/trees` that are read, `COLUMNS` among them.
 
     Raises
     ------
@@ -63,7 +82,7 @@ class StandYears:
         If it has no table of trees, or no year.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, columns: tuple[str, ...] = COLUMNS) -> None:
         if "trees" not in run.tables:
             raise InputError(
                 "holds no table of trees",
@@ -72,11 +91,13 @@ class StandYears:
             )
         if not len(run.years):
             raise InputError("holds no years yet", where=str(run.path))
-        self.run = run
+        self.run, self.columns = run, columns
         self.first, self.last = int(run.years[0]), int(run.years[-1])
+        self.rows = lru_cache(maxsize=_CACHED_YEARS)(self._rows)
         self.living = lru_cache(maxsize=3)(self._living)
         self.gone = lru_cache(maxsize=2)(self._gone)
         self.residual = lru_cache(maxsize=2)(self._residual)
+        self._obstacles = lru_cache(maxsize=8)(self._obstacles_at)
 
     def check_year(self, year: int | None, name: str, usual: int) -> int:
         """Give the year, the usual one if none is given; refuse one that is not on file."""
@@ -90,9 +111,13 @@ class StandYears:
             )
         return year
 
+    def _rows(self, year: int) -> pd.DataFrame:
+        """Rows of `/trees` at the end of a year, those that died in it among them."""
+        return self.run.read("trees", self.columns, years=(year, year))
+
     def _living(self, year: int) -> pd.DataFrame:
         """Rows of the trees that live at the end of a year."""
-        trees = self.run.read("trees", COLUMNS, years=(year, year))
+        trees = self.rows(year)
         return trees[(trees["status"] == "living") & (trees["height_m"] > 0.0)].reset_index(
             drop=True
         )
@@ -114,10 +139,35 @@ class StandYears:
         """Rows of the residual trees that stand, in the columns of the others."""
         if "residual" not in self.run.tables:
             return self.living(year).iloc[:0].assign(fate="")
-        rows = self.run.read("residual", years=(year, year))
-        rows = rows[rows["status"] == "standing"].reset_index(drop=True)
-        rows = rows.assign(tree_id=-rows["residual_id"], status="living", age=0, fate="")
-        return rows.reindex(columns=[*COLUMNS, "fate"])
+        return residual_rows(self.run.read("residual", years=(year, year)))
+
+    @cached_property
+    def _snags(self) -> pd.DataFrame:
+        run = self.run
+        if run.scenario.mortality.snags and "events" in run.tables:
+            places = run.read("trees", PLACE_COLUMNS)
+            return snags_of(run.scenario, run.read("events", EVENT_COLUMNS), places)
+        return self.living(self.first).iloc[:0].assign(fate=SNAG, first=0, last=0)
+
+    def others(self, year: int) -> pd.DataFrame:
+        """Rows of the residual trees and the snags that stand at the end of a year.
+
+        `COLUMNS` and `fate`; residual trees have numbers below 0.
+        """
+        return together((self.residual(year), in_year(self._snags, year)), (*COLUMNS, "fate"))
+
+    def obstacles(self, year: int) -> tuple[Obstacle, ...]:
+        """The obstacles that stand at the end of a year."""
+        return self._obstacles(min(max(year, self.first), self.last))
+
+    def _obstacles_at(self, year: int) -> tuple[Obstacle, ...]:
+        scenario = self.run.scenario
+        if not any(act.kind == "obstacle" for act in scenario.acts):
+            return scenario.obstacles
+        done = None
+        if "treatments" in self.run.tables:
+            done = self.run.read("treatments", ["year", "number", "act"])
+        return obstacles_at(scenario, year, done)
 
     def at(self, moment: float, since: float) -> pd.DataFrame:
         """Give the trees at a moment between the ends of two years.
@@ -132,22 +182,37 @@ class StandYears:
         Returns
         -------
         DataFrame
-            `COLUMNS` and `fate`: empty for the living, else one of `FATES`. Residual trees that
-            stand at the end of the year come last, with numbers below 0.
+            `COLUMNS` and `fate`: empty for the living, else one of `FATES`, or `SNAG`. Trees that
+            are felled or thrown come down through the year, those that die lose their crowns.
+            Residual trees, with numbers below 0, and snags that stand at the end of the year come
+            last.
         """
-        import pandas as pd
-
         year = int(np.ceil(moment))
         share = moment - (year - 1)
         trees = self.living(year).assign(fate="")
         if share < 1.0 and year > self.first:
             trees = _between(self.living(year - 1), trees, share)
-        gone = [self.gone(y) for y in range(max(int(np.floor(since)), self.first) + 1, year + 1)]
-        more = [rows for rows in (*gone, self.residual(year)) if len(rows)]
-        if not more:
-            return trees
-        parts = [rows.astype({"species": object}) for rows in (trees, *more)]
-        return pd.concat(parts, ignore_index=True)
+        before = range(max(int(np.floor(since)), self.first) + 1, year + 1)
+        gone = [_going(self.gone(y), share if y == year else 1.0) for y in before]
+        others = self.others(year)
+        for rows in gone:  # who dies standing is a snag from the next frames on
+            others = others[(others["fate"] != SNAG) | ~others["tree_id"].isin(rows["tree_id"])]
+        return together((trees, *gone, others), (*COLUMNS, "fate"))
+
+
+def _going(gone: pd.DataFrame, share: float) -> pd.DataFrame:
+    """Let trees that go in a year fall or lose their crowns by a share of the year."""
+    falls = gone["fate"].isin(_FALLING).to_numpy()
+    lean = np.nan_to_num(gone["lean_deg"].to_numpy(np.float64))
+    lean = np.where(falls, lean + (_FALLEN_DEG - lean) * share**2, lean)
+    low = np.where(falls, np.cos(np.radians(lean)), 1.0)
+    reach = np.where(gone["fate"] == "died", 1.0 - (1.0 - _BARE) * share, 1.0)
+    return gone.assign(
+        lean_deg=lean,
+        height_m=gone["height_m"].to_numpy(np.float64) * low,
+        crown_base_m=gone["crown_base_m"].to_numpy(np.float64) * low,
+        crown_radius_m=gone["crown_radius_m"].to_numpy(np.float64) * reach,
+    )
 
 
 def _between(before: pd.DataFrame, now: pd.DataFrame, share: float) -> pd.DataFrame:

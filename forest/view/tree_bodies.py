@@ -20,6 +20,7 @@ _LEAST_SLENDERNESS = 120.0  # height over base diameter, of a stem with no diame
 _BUTT = 1.15  # base diameter over dbh where only the dbh is on record
 _MOST_LEAN_DEG = 80.0
 _WIDEST_AT = 0.15  # of a conifer's crown, from its base up: widest there, then a cone
+_ROUND_AT = 0.36  # of other crowns, where they are widest
 _CONE = 0.85  # power of that cone; below 1 it bulges a little
 _GOLDEN = 0.6180339887498949
 
@@ -45,6 +46,16 @@ class Bodies(NamedTuple):
     crown: NDArray[np.bool_]
 
 
+def no_bodies() -> Bodies:
+    """Give the bodies of no tree."""
+    return Bodies(
+        np.zeros((0, 3), np.float32),
+        np.zeros((0, 3), np.int32),
+        np.zeros(0, np.int32),
+        np.zeros(0, np.bool_),
+    )
+
+
 def tree_bodies(
     trees: pd.DataFrame,
     *,
@@ -57,9 +68,9 @@ def tree_bodies(
 
     A stem is as thick at its base and at 1.3 m as measured, and ends in a point at the tree's
     height. A crown reaches from the crown's base to the top, and is at its widest as wide as the
-    crown's mean radius: a cone with a rounded foot for conifers, an ellipsoid for others. A tree
-    that leans has its top where the lean puts it; the direction is not on record, and is drawn
-    from the tree's number.
+    crown's mean radius: a cone with a rounded foot for conifers, for others the halves
+    of two ellipsoids, the upper one the higher. A tree that leans has its top where the lean puts
+    it; the direction is not on record, and is drawn from the tree's number.
 
     Parameters
     ----------
@@ -140,11 +151,13 @@ def _stem_levels(
 
 
 def _ellipsoid(rings: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give levels (0 to 1) and widths (0 to 1) of an ellipsoid's rings, with both ends."""
+    """Give levels (0 to 1) and widths (0 to 1) of a round crown's rings, with both ends."""
     turn = np.linspace(0.0, np.pi, rings + 2)
     width = np.sin(turn)
     width[[0, -1]] = 0.0
-    return 0.5 * (1.0 - np.cos(turn)), width / width.max()
+    rise = -np.cos(turn)
+    level = _ROUND_AT + np.where(rise < 0.0, _ROUND_AT, 1.0 - _ROUND_AT) * rise
+    return level, width / width.max()
 
 
 def _cone(rings: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -170,7 +183,8 @@ def _rounds(
     foot, shift : float64 (n, 2)
         Where the axis meets the ground, m; how far it moves aside, m per m of height.
     levels, radius : float64 (n, k)
-        Height and radius of each ring, from below; the first and the last ring are points.
+        Height and radius of each ring, from below; the first and the last ring are points. Rings
+        stand across the axis; what would lie below the ground lies on it.
     sides : int
         Corners of a ring.
     turned : float64 (n,)
@@ -182,9 +196,16 @@ def _rounds(
     axis = foot[:, None] + shift[:, None] * levels[:, :, None]
     per = 2 + (k - 2) * sides
     points = np.empty((n, per, 3), np.float32)
+    tilt = np.hypot(*shift.T)
+    cosine = 1.0 / np.sqrt(1.0 + tilt**2)
+    way = shift / np.maximum(tilt, 1e-12)[:, None]
+    along = np.einsum("nsi,ni->ns", around, way)
+    around = around + ((cosine - 1.0)[:, None] * along)[..., None] * way[:, None]
+    drop = (tilt * cosine)[:, None] * along
     inner = axis[:, 1:-1, None] + radius[:, 1:-1, None, None] * around[:, None]
     points[:, 2:, :2] = inner.reshape(n, per - 2, 2)
-    points[:, 2:, 2] = np.repeat(levels[:, 1:-1], sides, axis=1)
+    height = levels[:, 1:-1, None] - radius[:, 1:-1, None] * drop[:, None]
+    points[:, 2:, 2] = np.maximum(height, 0.0).reshape(n, per - 2)
     points[:, :2, :2], points[:, :2, 2] = axis[:, [0, -1]], levels[:, [0, -1]]
 
     side = np.arange(sides)

@@ -39,12 +39,15 @@ SCALES = {
 }
 COLOURS = ("species", *SCALES)
 
-#: Trees that have just gone.
+#: Trees that have just gone, and dead ones that stand.
 FATE_COLOURS = {
     "died": (0.42, 0.38, 0.36),
     "felled": (0.84, 0.19, 0.15),
     "windthrown": (0.96, 0.55, 0.10),
+    "snag": (0.58, 0.56, 0.54),
 }
+#: Residual trees, where colours stand for the species of the others.
+RESIDUAL = (0.55, 0.62, 0.52)
 _NOT_KNOWN = (0.72, 0.72, 0.69)
 _PALEST = 0.1  # of a map: what is paler does not stand out from the ground
 
@@ -70,11 +73,14 @@ class TreeColours(NamedTuple):
         The value at the scale's upper end; its lower end is 0.
     species : tuple of str
         All species, in their order.
+    residual : bool
+        Whether residual trees stand among the others.
     """
 
     by: str
     top: float
     species: tuple[str, ...]
+    residual: bool = False
 
     @classmethod
     def of_run(cls, run: Run, by: str) -> TreeColours:
@@ -92,13 +98,14 @@ class TreeColours(NamedTuple):
             column = SCALES[by].column
             values = run.read("trees", [column])[column].to_numpy(np.float64)
             top = float(np.nanmax(values)) if np.isfinite(values).any() else 1.0
-        return cls(by, max(top, 1e-6), run.species_names)
+        return cls(by, max(top, 1e-6), run.species_names, "residual" in run.tables)
 
     def of(self, trees: pd.DataFrame) -> NDArray[np.float64]:
         """Give each tree's colour (n, 3), 0 to 1; those with a `fate` have its colour."""
         if self.by == "species":
             names = trees["species"].astype(str)
             rgb = np.array([look_of(name).line for name in names], np.float64).reshape(-1, 3)
+            rgb[trees["tree_id"].to_numpy() < 0] = RESIDUAL
         else:
             scale = SCALES[self.by]
             values = trees[scale.column].to_numpy(np.float64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,7 @@ from forest.surface.blend import blended
 from forest.surface.tubes import tubes
 from forest.trees.leaves import leaves_of
 from forest.trees.skeleton import Skeleton
-from forest.view.film import check_film, write_film
-from forest.view.movie import FilmSettings
+from forest.view.film import FilmSettings, check_film, write_film
 from forest.view.overlay import font
 from forest.view.scene import Scene, import_pyvista, look_at, open_plotter, shoot
 from forest.view.surface_picture import add_textured
@@ -110,11 +110,8 @@ def film_tree(
     def frame(k: int) -> NDArray[np.uint8]:
         return stage.picture(at[k], k / count)
 
-    begin(count)
-    try:
-        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, done=done)
-    finally:
-        stage.close()
+    with closing(stage):
+        write_film(frame, count, to, fps=settings.fps, overwrite=overwrite, begin=begin, done=done)
     return count
 
 

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from forest.errors import InputError
-from forest.viewer.colours import CHOICES, colour_trees
+from forest.view.stand_years import conifers_of
+from forest.viewer.colours import CHOICES, colour_trees, colours_of_others, legend_of_others
 from forest.viewer.detail import trees_in_detail
 from forest.viewer.picking import Hit
 from forest.viewer.server import import_trame
@@ -74,8 +75,7 @@ class App:
         self.server = trame.get_server(f"forest-{id(self)}", client_type="vue3")
         self.state = self.server.state
         self.source = source
-        conifers = [kind.name for kind in source.scenario.species_list if kind.group == "conifer"]
-        self.stage = Stage(source.scenario.plot.size_m, conifers)
+        self.stage = Stage(source.scenario.plot.size_m, conifers_of(source.scenario))
         self.tools: dict[str, Tool] = {}
         self._pressed: tuple[float, float, Hit] | None = None
         self._wanted: dict[str, Callable[[], None]] = {}
@@ -152,19 +152,24 @@ class App:
         state.year = years[state.step]
         self.trees = self.source.trees(self.year)
         self.colours, legend = colour_trees(self.source, self.trees, state.colour_by)
-        state.legend = legend.as_state()
+        others = self.source.others(self.year)
+        self._legend_of_others = legend_of_others(others)
+        state.legend = legend.with_more(self._legend_of_others).as_state()
         known = self.source.with_branches(self.year)
         state.branches_known = bool(known)
         self._in_detail = trees_in_detail(self)
         shapes = [self.source.skeleton(tree, self.year) for tree in self._in_detail]
         alone = self.chosen if state.alone else None
         self.stage.show_trees(self.trees, self.colours, shapes, alone=alone)
+        standing = self.source.standing_obstacles(self.year) if alone is None else ()
+        others = others if alone is None else others.iloc[:0]
+        self.stage.show_others(others, colours_of_others(others), standing)
         self.refresh()
 
     def show_colours(self) -> None:
         """Colour the trees anew."""
         self.colours, legend = colour_trees(self.source, self.trees, self.state.colour_by)
-        self.state.legend = legend.as_state()
+        self.state.legend = legend.with_more(self._legend_of_others).as_state()
         self.stage.recolour(self.colours)
         self.refresh()
 

@@ -208,6 +208,6 @@ class BrushTool(BranchTool):
         """Say how much of each stroke is colonised."""
         said = []
         for row in self.desk.source.strokes.itertuples():
-            taken = "" if row.colonised < 0 else f", {row.colonised} colonised"
-            said.append(f"Stroke {row.stroke} of {row.year}: {row.laid} markers{taken}")
+            taken = f"{row.laid} markers, {row.colonised} colonised"
+            said.append(f"Stroke {row.stroke} of {row.year}: {taken}")
         self.state.brush_strokes = said

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from forest.view.looks import look_of
 from forest.view.stand_years import FATES
-from forest.view.tree_colours import SCALES, Scale, on_scale
+from forest.view.standing import SNAG
+from forest.view.tree_colours import FATE_COLOURS, RESIDUAL, SCALES, Scale, on_scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,6 +79,10 @@ class Legend:
     ends: tuple[str, str] = ("", "")
     gradient: str = ""
 
+    def with_more(self, entries: list[tuple[str, str]]) -> Legend:
+        """Give it with more entries."""
+        return replace(self, entries=[*self.entries, *entries])
+
     def as_state(self) -> dict[str, Any]:
         """Give what a page can hold."""
         entries = [{"name": name, "colour": colour} for name, colour in self.entries]
@@ -135,6 +140,19 @@ def colour_trees(source: Source, trees: pd.DataFrame, by: str) -> tuple[Colours,
     gradient = f"linear-gradient(to right, {', '.join(stops)})"
     ends = "0", f"{most:.{_DECIMALS.get(by, 0)}f}"
     return colours, Legend(scale.title, scale.unit, _dead_entry(dead), ends, gradient)
+
+
+def colours_of_others(others: pd.DataFrame) -> Colours:
+    """Colour residual trees and snags, (n, 3), 0 to 1."""
+    snag = (others["fate"] == SNAG).to_numpy(np.bool_)
+    return np.where(snag[:, None], FATE_COLOURS[SNAG], RESIDUAL)
+
+
+def legend_of_others(others: pd.DataFrame) -> list[tuple[str, str]]:
+    """Name what of residual trees and snags is there."""
+    snag = (others["fate"] == SNAG).to_numpy(np.bool_)
+    named = [("residual tree", ~snag, RESIDUAL), ("snag", snag, FATE_COLOURS[SNAG])]
+    return [(name, css(colour)) for name, here, colour in named if here.any()]
 
 
 def vigour(trees: pd.DataFrame) -> NDArray[np.float64]:

@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from forest.errors import InputError
+from forest.view.stand_years import COLUMNS as BODY_COLUMNS
+from forest.view.standing import (
+    EVENT_COLUMNS,
+    PLACE_COLUMNS,
+    in_year,
+    residual_rows,
+    snags_of,
+    together,
+)
 from forest.viewer.source import COLUMNS, largest_of
 
 if TYPE_CHECKING:
@@ -23,6 +32,7 @@ if TYPE_CHECKING:
     from forest.live import LiveSession
     from forest.record.run import Run
     from forest.scenario import Scenario
+    from forest.scenario.model import Obstacle
     from forest.stand import Stand
     from forest.surface.export import Part
     from forest.trees.skeleton import Skeleton
@@ -65,6 +75,7 @@ class LiveSource:
         self._near: list[int] = []
         self._first_year = session.scenario.start_year - 1
         self._at_first = self._trees_at_first()
+        self._residual_at_first = session.stand.residual.table
         self.refresh()
 
     def refresh(self) -> None:
@@ -75,6 +86,12 @@ class LiveSource:
                 raise InputError(f"keeps no table '{table}', which a view needs", where=self.where)
         self.scenario: Scenario = self.session.scenario
         self._trees, self.stand, self.events = tables["trees"], tables["stand"], tables["events"]
+        self._snags = snags_of(
+            self.scenario, self.events[list(EVENT_COLUMNS)], self._trees[list(PLACE_COLUMNS)]
+        )
+        self._residual = tables.get(
+            "residual", self._residual_at_first.assign(year=self._first_year)
+        )
         records = self.session.records
         self.years = (self._first_year, *(record.year for record in records))
         self.now = self._first_year if not records else records[-1].year
@@ -118,6 +135,18 @@ class LiveSource:
             return self._at_first
         rows = self._trees["year"].to_numpy() == year
         return self._trees.loc[rows, list(COLUMNS)].reset_index(drop=True)
+
+    def others(self, year: int) -> pd.DataFrame:
+        """Residual trees and snags that stand at the end of a year."""
+        residual = self._residual[self._residual["year"] == year]
+        if year == self._first_year:
+            residual = self._residual_at_first
+        parts = residual_rows(residual), in_year(self._snags, year)
+        return together(parts, (*BODY_COLUMNS, "fate"))
+
+    def standing_obstacles(self, year: int) -> tuple[Obstacle, ...]:
+        """None: the desk draws them as acts will leave them."""
+        return ()
 
     def life(self, tree_id: int) -> pd.DataFrame:
         """Year, dbh and height of a tree over its life."""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from forest.scenario.shaping import ChangeObstacle
+from forest.view.bodies_scene import surface_of
 from forest.viewer.desk import Desk
 from forest.viewer.live_tools import LiveTool
-from forest.viewer.pending import surface_of
 from forest.viewer.picking import Hit, Ray
 from forest.viewer.tool_options import as_number, number_field
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from forest.scenario.model import Box, Obstacle
-from forest.view.scene import import_pyvista
+from forest.view.bodies_scene import surface_of
 from forest.viewer.drawing import draw_points, draw_rings, draw_surfaces
 from forest.viewer.live_source import LiveSource
 from forest.viewer.stage import Stage
@@ -53,15 +51,6 @@ def draw_pending(stage: Stage, source: LiveSource) -> None:
     ):
         step = max(1, -(-len(points) // _MOST_POINTS))
         draw_points(stage, name, points[::step], colour, 3.0)
-
-
-def surface_of(obstacle: Obstacle) -> Any:
-    """Give the surface of an obstacle, a pyvista mesh."""
-    pv = import_pyvista()
-    if isinstance(obstacle, Box):
-        low, high = obstacle.min_m, obstacle.max_m
-        return pv.Box([x for pair in zip(low, high, strict=True) for x in pair])
-    return pv.read(obstacle.file).translate(obstacle.at_m)
 
 
 def draw_obstacles(

@@ -10,6 +10,7 @@ import numpy as np
 
 from forest.errors import InputError
 from forest.view.stand_years import COLUMNS as BODY_COLUMNS
+from forest.view.stand_years import StandYears
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,11 +18,11 @@ if TYPE_CHECKING:
     from forest.dendro.disc import Disc
     from forest.record.run import Run
     from forest.scenario import Scenario
+    from forest.scenario.model import Obstacle
     from forest.stand import Stand
     from forest.surface.export import Part
     from forest.trees.skeleton import Skeleton
 
-_CACHED_YEARS = 64
 #: Columns of a year's trees that are read for pictures and cards.
 COLUMNS = (
     *BODY_COLUMNS,
@@ -90,6 +91,12 @@ class Source(Protocol):
     def trees(self, year: int) -> pd.DataFrame:
         """Rows of `/trees` at the end of a year, `COLUMNS`, those that died in it among them."""
 
+    def others(self, year: int) -> pd.DataFrame:
+        """Residual trees and snags at the end of a year: columns for bodies, and `fate`."""
+
+    def standing_obstacles(self, year: int) -> tuple[Obstacle, ...]:
+        """Obstacles at the end of a year; none where a tool draws them."""
+
     def life(self, tree_id: int) -> pd.DataFrame:
         """Rows of `/trees` of one tree: `year`, `dbh_cm`, `height_m`."""
 
@@ -137,15 +144,13 @@ class RunSource:
 
     def __init__(self, run: Run) -> None:
         self.where = str(run.path)
-        if not len(run.years):
-            raise InputError("holds no years yet", where=self.where)
         for table in ("trees", "stand", "events"):
             if table not in run.tables:
                 raise InputError(f"holds no table '{table}', which a view needs", where=self.where)
         self._run = run
         self.title = run.scenario.title or Path(run.path).name
         self.years = tuple(int(year) for year in run.years)
-        self._read_trees = lru_cache(_CACHED_YEARS)(self._trees)
+        self._years = StandYears(run, COLUMNS)
         self._restored = lru_cache(1)(self._restore)
 
     @property
@@ -170,10 +175,15 @@ class RunSource:
 
     def trees(self, year: int) -> pd.DataFrame:
         """Rows at the end of a year."""
-        return self._read_trees(year)
+        return self._years.rows(year)
 
-    def _trees(self, year: int) -> pd.DataFrame:
-        return self._run.read("trees", COLUMNS, years=(year, year))
+    def others(self, year: int) -> pd.DataFrame:
+        """Residual trees and snags that stand at the end of a year."""
+        return self._years.others(year)
+
+    def standing_obstacles(self, year: int) -> tuple[Obstacle, ...]:
+        """Obstacles that stand at the end of a year."""
+        return self._years.obstacles(year)
 
     @cached_property
     def _lives(self) -> pd.DataFrame:

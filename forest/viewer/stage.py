@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forest.scenario.model import Obstacle
 from forest.trees.skeleton import Skeleton
-from forest.view.looks import look_of
+from forest.view.bodies_scene import BodiesScene, add_lit, add_obstacles, barks, lay_ground
 from forest.view.scene import Scene, import_pyvista, look_at
 from forest.view.shading import SUN
-from forest.view.tree_bodies import Bodies, tree_bodies
 from forest.viewer.picking import Hit, Ray, first_triangle, nearest_segment
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ _SKY = (0.96, 0.97, 0.97), (0.80, 0.87, 0.92)
 _GROUND = (0.80, 0.78, 0.70)
 _GRID = (0.70, 0.68, 0.60)
 _CHOSEN = (0.98, 0.62, 0.10)
-_AMBIENT = 0.56  # share of a colour that is seen on the side away from the sun
 _POINTER_RAD = 0.004
 GRID_M = 10.0
 
@@ -64,7 +63,6 @@ class Stage:
     def __init__(self, size_m: tuple[float, float], conifers: Collection[str]) -> None:
         pv = import_pyvista()
         self.size_m = size_m
-        self._conifers = frozenset(conifers)
         self.plotter = pv.Plotter(off_screen=True, window_size=_WINDOW, lighting="none")
         self.plotter.render_window.SetMultiSamples(0)
         self.plotter.set_background(_SKY[0], top=_SKY[1])
@@ -72,17 +70,11 @@ class Stage:
         for towards, strength in ((SUN, 0.85), (SUN * (-1.0, -1.0, 0.6), 0.4)):
             lamp = pv.Light(position=tuple(towards), intensity=strength, light_type="scene light")
             self.plotter.add_light(lamp)  # for what has no light baked into it
-        self._bodies = Bodies(
-            np.zeros((0, 3), np.float32),
-            np.zeros((0, 3), np.int32),
-            np.zeros(0, np.int32),
-            np.zeros(0, np.bool_),
-        )
+        self._bodies = BodiesScene(self.plotter, conifers, _DETAIL)
+        self._others = BodiesScene(self.plotter, conifers, _DETAIL, "others")
         self._ids = np.zeros(0, np.int64)
         self._species: list[str] = []
         self._colours = np.zeros((0, 3))
-        self._light = np.zeros(0)
-        self._mesh: Any = None
         self._chosen: int | None = None
         self._skeletons: dict[int, Skeleton] = {}
         self._dressed: int | None = None
@@ -90,7 +82,7 @@ class Stage:
         self._top = 1.0
         self._looked: tuple[str, tuple[float, ...]] | None = None
         self.window.AddObserver("WindowResizeEvent", lambda *_: self._look_again())
-        self._lay_ground()
+        lay_ground(self.plotter, size_m, _GROUND, _GRID, grid_m=GRID_M)
 
     @property
     def window(self) -> Any:
@@ -125,31 +117,17 @@ class Stage:
         alone : int, optional
             The only tree that is shown.
         """
-        sides = next(sides for most, sides in _DETAIL if len(trees) <= most)
-        self._bodies = tree_bodies(
-            trees,
-            stem_sides=sides[0],
-            crown_sides=sides[1],
-            crown_rings=sides[2],
-            conifers=self._conifers,
-        )
         self._ids = trees["tree_id"].to_numpy(np.int64)
         self._species = list(trees["species"].astype(str))
         self._top = float(np.nanmax(trees["height_m"].to_numpy(np.float64), initial=1.0))
-        self._light = _baked_light(self._bodies)
         self._skeletons = {
             shape.tree_id: shape for shape in skeletons if alone in (None, shape.tree_id)
         }
         shown = ~np.isin(self._ids, list(self._skeletons))
         if alone is not None:
             shown &= self._ids == alone
-        if not (shown.all() and self.crowns):
-            corner = self._bodies.triangles[:, 0]
-            kept = shown[self._bodies.tree[corner]]
-            kept &= self.crowns | ~self._bodies.crown[corner]
-            self._bodies = self._bodies._replace(triangles=self._bodies.triangles[kept])
+        self._bodies.show(trees, shown, crowns=self.crowns)
         self.put("branches", self._add_branches if self._skeletons else None)
-        self._place_bodies()
         self.recolour(colours)
 
     def recolour(self, colours: NDArray[np.float64]) -> None:
@@ -173,23 +151,30 @@ class Stage:
             self._dressed = tree_id
             self.put("branches", self._add_branches if self._skeletons else None)
 
-    def _place_bodies(self) -> None:
-        pv = import_pyvista()
-        bodies = self._bodies
-        self._mesh = pv.PolyData()
-        if len(bodies.triangles):
-            self._mesh = pv.PolyData.from_regular_faces(bodies.points, bodies.triangles)
-            self._mesh.point_data["rgb"] = np.zeros((self._mesh.n_points, 3), np.uint8)
-        self.plotter.remove_actor("bodies", render=False)
-        if len(bodies.triangles):
-            self._add(self._mesh, "bodies", scalars="rgb", rgb=True, culling="back")
+    def show_others(
+        self,
+        others: pd.DataFrame,
+        colours: NDArray[np.float64],
+        obstacles: Sequence[Obstacle] = (),
+    ) -> None:
+        """Put up what stands among the trees and cannot be chosen, in place of that before.
+
+        Parameters
+        ----------
+        others : DataFrame
+            As `tree_bodies` takes them.
+        colours : float64 (n, 3)
+            Of each of them, crown and stem, 0 to 1.
+        obstacles : sequence of Obstacle
+        """
+        height = others["height_m"].to_numpy(np.float64)
+        self._top = float(np.nanmax(height, initial=self._top))
+        self._others.show(others, crowns=self.crowns)
+        self._others.paint(colours, colours)
+        add_obstacles(self.plotter, obstacles)
 
     def _paint(self) -> None:
-        bodies = self._bodies
-        if self._mesh is None or not self._mesh.n_points:
-            return
-        barks = {name: look_of(name).bark for name in set(self._species)}
-        bark = np.array([barks[name] for name in self._species]).reshape(-1, 3)
+        bark = barks(self._species)
         crown = self._colours.copy()
         for tree_id, tint in self.tints.items():
             crown[self._ids == tree_id] = tint
@@ -197,11 +182,7 @@ class Stage:
             here = self._ids == self._chosen
             crown[here] = _CHOSEN
             bark[here] = 0.5 * (bark[here] + _CHOSEN)
-        base = np.where(bodies.crown[:, None], crown[bodies.tree], 0.85 * bark[bodies.tree])
-        lit = base * self._light[:, None]
-        self._mesh.point_data["rgb"][:] = np.asarray(255.0 * lit.clip(0.0, 1.0), np.uint8)
-        self._mesh.GetPointData().GetArray("rgb").Modified()
-        self._mesh.Modified()
+        self._bodies.paint(crown, bark)
 
     def _mark(self) -> None:
         """Lay a ring around the foot of the chosen tree."""
@@ -210,11 +191,11 @@ class Stage:
         rows = np.flatnonzero(self._ids == self._chosen)
         if not len(rows):
             return
-        points = self._bodies.points[self._bodies.tree == rows[0]]
+        points = self._bodies.bodies.points[self._bodies.bodies.tree == rows[0]]
         foot = points[np.argmin(points[:, 2])]
         reach = np.linalg.norm(points[:, :2] - foot[:2], axis=1).max() * 1.08 + 0.15
         ring = pv.Disc(center=(*foot[:2], 0.04), inner=0.86 * reach, outer=reach, c_res=48)
-        self._add(ring, "chosen", color=_CHOSEN)
+        add_lit(self.plotter, ring, "chosen", color=_CHOSEN)
 
     def _add_branches(self, plotter: Any) -> None:
         drawn = [shape for tree_id, shape in self._skeletons.items() if tree_id != self._dressed]
@@ -271,7 +252,8 @@ class Stage:
     def look_at_tree(self, tree_id: int) -> None:
         """Point the camera at one tree."""
         row = np.flatnonzero(self._ids == tree_id)
-        points = self._bodies.points[np.isin(self._bodies.tree, row)].astype(np.float64)
+        bodies = self._bodies.bodies
+        points = bodies.points[np.isin(bodies.tree, row)].astype(np.float64)
         if tree_id in self._skeletons:
             points = self._skeletons[tree_id].end
         if len(points):
@@ -290,35 +272,6 @@ class Stage:
         )
         if above > 80.0:
             self.plotter.camera.up = (0.0, 1.0, 0.0)
-
-    def _lay_ground(self) -> None:
-        pv = import_pyvista()
-        width, depth = self.size_m
-        ground = pv.Plane(
-            center=(width / 2, depth / 2, -0.02),
-            i_size=width,
-            j_size=depth,
-            i_resolution=1,
-            j_resolution=1,
-        )
-        self._add(ground, "ground", color=_GROUND)
-        ends = [((x, 0.0), (x, depth)) for x in (*np.arange(0.0, width, GRID_M), width)] + [
-            ((0.0, y), (width, y)) for y in (*np.arange(0.0, depth, GRID_M), depth)
-        ]
-        points = np.array([(*point, 0.0) for line in ends for point in line], np.float32)
-        self._add(pv.line_segments_from_points(points), "grid", color=_GRID, line_width=1)
-
-    def _add(self, mesh: Any, name: str, **keys: Any) -> None:
-        self.plotter.add_mesh(
-            mesh,
-            name=name,
-            lighting=False,
-            show_scalar_bar=False,
-            reset_camera=False,
-            render=False,
-            copy_mesh=False,
-            **keys,
-        )
 
     # ------------------------------------------------------------------ the pointer
 
@@ -344,9 +297,10 @@ class Stage:
         """Say what lies at a place of the picture."""
         ray = self.ray(across, down)
         best: tuple[float, int, int | None] | None = None
-        met = first_triangle(self._bodies.points, self._bodies.triangles, ray)
+        bodies = self._bodies.bodies
+        met = first_triangle(bodies.points, bodies.triangles, ray)
         if met is not None:
-            row = self._bodies.tree[self._bodies.triangles[met[0], 0]]
+            row = bodies.tree[bodies.triangles[met[0], 0]]
             best = (met[1], int(self._ids[row]), None)
         for tree_id, shape in self._skeletons.items():
             wood = nearest_segment(shape.start, shape.end, shape.radius, ray, _POINTER_RAD)
@@ -356,19 +310,3 @@ class Stage:
             return Hit(best[1], best[2], ray.at(best[0]), ray, pressure)
         ground = ray.on_plane(np.zeros(3), np.array([0.0, 0.0, 1.0]))
         return Hit(None, None, ground, ray, pressure)
-
-
-def _baked_light(bodies: Bodies) -> NDArray[np.float64]:
-    """Give how bright each point is: sun by the surface's slope, shade low in the crown."""
-    points, triangles = bodies.points, bodies.triangles
-    corner = points[triangles[:, 0]]
-    normal = np.cross(points[triangles[:, 1]] - corner, points[triangles[:, 2]] - corner)
-    total = np.empty((len(points), 3))
-    for axis in range(3):
-        total[:, axis] = sum(
-            np.bincount(triangles[:, k], normal[:, axis], len(points)) for k in range(3)
-        )
-    length = np.linalg.norm(total, axis=1)
-    facing = np.divide(total @ SUN, length, out=np.zeros(len(points)), where=length > 0.0)
-    light: NDArray[np.float64] = _AMBIENT + (1.06 - _AMBIENT) * (0.5 + 0.5 * facing)
-    return light

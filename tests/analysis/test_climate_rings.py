@@ -56,7 +56,7 @@ def test_without_a_response_the_drought_leaves_no_mark(tmp_path: Path) -> None:
     """The ring is narrow because the species answers, not because of anything else."""
     same = "response.drought_index_curve=[]"
     deaf = [f"species.{name}.{same}" for name in ("picea_abies", "pinus_sylvestris")]
-    scenario = TRIAL.with_overrides([*deaf, "plot.size_m=[20, 20]"])
+    scenario = TRIAL.with_overrides([*deaf, "plot.size_m=[16, 16]"])
     with simulate(scenario, tmp_path / "run.h5") as run:
         assert (run.climate["factor"] == 1.0).all()
         assert run.climate["drought_index"].std() > 0.5

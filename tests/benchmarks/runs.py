@@ -136,6 +136,7 @@ def time_starts(warm_rounds: int) -> dict[str, float]:
     """
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "FOREST_CACHE": str(Path(folder) / "cache")}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # nobody parses the sources at each start
         out = str(Path(folder) / "run.h5")
         scenario = str(SCENARIOS / "saxony_spruce.toml")
         first_year = ["run", scenario, "--years", "1", "--out", out, "--force"]

@@ -54,6 +54,7 @@ def grown(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return simulate(_scenario(), tmp_path_factory.mktemp("grown") / "run.h5", threads=1)
 
 
+@pytest.mark.usefixtures("three_threads")
 def test_same_on_threads_and_resumed(grown: Run, tmp_path: Path) -> None:
     out = tmp_path / "run.h5"
     with simulate(_scenario(), out, threads=2) as other:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from forest.environment.brush import PER_METRE, Pieces, cut_path, lay_markers, within_piece
 from forest.environment.dormant import BOTH, LATERAL_ALONE, TERMINAL_ALONE, Hold, dormant_buds
@@ -27,7 +28,7 @@ def a_stroke(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return points, rng.uniform(0.03, 0.4, n)
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**63 - 1), number=st.integers(1, 2**40))
 def test_markers_equal_the_twin(seed: int, number: int) -> None:
     """One marker per cell, where the spheres hold it, above the ground; each exactly once."""
@@ -142,14 +143,13 @@ def test_turns(times: int) -> None:
     for k in range(exact):
         assert as_set(turn(whole, X, Y, exact, k) if exact > 1 else whole) == as_set(whole)
     again = turn(whole, X, Y, times, 1)
-    order, other = np.lexsort(np.rint(whole.T * 1e4)), np.lexsort(np.rint(again.T * 1e4))
     assert len(again) == len(whole) == times * len(points)
     assert len(parts) == len(whole)
     if exact == times:
         np.testing.assert_array_equal(np.unique(whole, axis=0), np.unique(again, axis=0))
     else:
-        near = np.abs(whole[order][:, None, :2] - again[other][None, :, :2]).max(axis=2)
-        assert near.min(axis=1).max() <= 2e-6
+        away, _ = cKDTree(again).query(whole, p=np.inf)
+        assert away.max() <= 2e-6
 
 
 def test_tilings_are_exact() -> None:

@@ -266,6 +266,7 @@ def test_before_and_after_follow_the_years() -> None:
     assert 0.4 <= left < 1
 
 
+@pytest.mark.usefixtures("three_threads")
 def test_treatments_on_file_and_resumed(tmp_path: Path) -> None:
     """A run that another act stops goes on without it, and triggers have not forgotten."""
     act = RULES["trigger"].replace("at_most=2", "at_most=3")

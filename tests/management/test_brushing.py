@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forest.environment.marker_buds import list_buds
 from forest.errors import ActError, InputError
 from forest.record.checkpoint import latest_checkpoint
 from forest.record.schema import ACT_KINDS
@@ -206,12 +207,19 @@ def test_obstacles_and_ground_stay_free() -> None:
     assert len(free.surroundings.markers.laid.point) > len(laid) + 20
 
 
-def test_released_markers_are_not_counted() -> None:
-    stand = Stand(tree("environment.markers.release=true"))
+@pytest.mark.parametrize("boundary", ["open", "periodic"])
+def test_released_markers_are_counted_while_a_bud_is_near(boundary: str) -> None:
+    stand = Stand(tree("environment.markers.release=true", f"plot.boundary={boundary}"))
     stand.stroke(STEM, 0.2)
+    stand.stroke([[0.1, 0.1, 0.1]], 0.2)
     steps(stand, 2)
-    assert stand.strokes.colonised.tolist() == [-1]
-    assert len(stand.skeleton(1)) > 3
+    buds = list_buds(stand.arena.metamers, stand.rows)
+    species = stand.scenario.species_list[0]
+    reach = species.shoots.occupancy_radius_internodes * species.architecture.internode_length_m
+    point = stand.surroundings.markers.laid.point
+    apart = np.linalg.norm(point[:, None] - buds.position[None], axis=2).min(axis=1)
+    assert stand.strokes.colonised.tolist() == [int((apart <= reach).sum()), 0]
+    assert 0 < stand.strokes.colonised[0] < stand.strokes.markers[0]
 
 
 STROKES = (
@@ -226,6 +234,7 @@ def acts(*more: str) -> str:
     return f"acts=[{', '.join((*STROKES, *more))}]"
 
 
+@pytest.mark.usefixtures("three_threads")
 def test_strokes_on_file_resumed_and_on_threads(tmp_path: Path) -> None:
     """In the middle of strokes and holds; the same by hand."""
     every = "output={checkpoint_every_years=1, sample_trees={ids=[1]}}"

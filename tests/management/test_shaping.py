@@ -10,6 +10,7 @@ import pytest
 
 from forest.errors import ActError, InputError
 from forest.live import LiveSession
+from forest.management.places import check_places
 from forest.scenario import Scenario
 from forest.stand import Stand
 from tests.tiny import assert_same_state, assert_same_years, forest, steps, tiny, write_tiny
@@ -305,6 +306,50 @@ def test_nothing_is_planted_in_an_obstacle() -> None:
     with pytest.raises(InputError, match=r"Stand.plant: \(4, 4.5\) lies in an obstacle"):
         stand.plant([1.5, 4.0], [2.0, 4.5])
     assert len(stand.plant(pattern="regular", spacing_m=[1.0, 1.0], clear_m=0.1)) == 64 - 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            ("planting.trees=[{x_m=1, y_m=1}, {x_m=4, y_m=4}]",),
+            r"planting.trees\[1\]: \(4, 4\) lies",
+        ),
+        (
+            ("acts=[{kind='plant', years=[2001, 2002], x_m=[2, 4], y_m=[2, 3.5]}]",),
+            r"acts\[0\].x_m\[1\] in 2001: \(4, 3.5\) lies",
+        ),
+        (
+            (
+                "acts=[{kind='obstacle', year=2002, move='wall', by_m=[-2, 0, 0]}, "
+                "{kind='plant', years=[2001, 2002], x_m=[2], y_m=[4]}]",
+            ),
+            r"acts\[1\].x_m\[0\] in 2002: \(2, 4\) lies",
+        ),
+        (
+            ("acts=[{kind='obstacle', years=[2001, 2003], remove='wall'}]",),
+            r"acts\[0\].remove in 2003: no obstacle 'wall'",
+        ),
+        (
+            (
+                "acts=[{kind='obstacle', year=2002, remove='wall'}, "
+                "{kind='plant', year=2002, x_m=[4], y_m=[4]}]",
+            ),
+            None,
+        ),
+        (("acts=[{kind='plant', year=2001, pattern='regular', spacing_m=[1, 1]}]",), None),
+    ],
+)
+def test_places_are_checked_before_anything_grows(
+    changes: tuple[str, ...], said: str | None
+) -> None:
+    wall = "obstacles=[{kind='box', name='wall', min_m=[3, 3, 0], max_m=[5, 5, 2]}]"
+    scenario = tiny(*ALONE, wall, "planting.trees=[{x_m=1, y_m=1}]", *changes)
+    if said is None:
+        check_places(scenario)
+    else:
+        with pytest.raises(InputError, match=said):
+            check_places(scenario)
 
 
 def test_planting_sees_the_obstacles_of_its_year() -> None:

@@ -6,8 +6,6 @@ import os
 import random
 import resource
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -19,18 +17,24 @@ from forest.record import journal
 from forest.record.run import Run, open_run
 from forest.record.schema import TABLES
 from forest.record.writer import RunWriter
-from tests.record.years import FIRST_YEAR, PLANTED, append, create, make_year
-
-ROOT = Path(__file__).parents[2]
+from tests.forks import start
+from tests.record.years import (
+    FIRST_YEAR,
+    PLANTED,
+    append,
+    create,
+    make_year,
+    write_until_killed,
+)
 
 
 def assert_whole(run: Run, last: int) -> None:
     """Compare everything on file with what was meant to be written up to year `last`."""
     assert run.years.tolist() == list(range(FIRST_YEAR, last + 1))
+    rows = [make_year(year) for year in run.years]
     for table in TABLES:
         frame = run.read(table)
         for name in frame:
-            rows = [make_year(year) for year in run.years]
             years = [row[table][name] if table in row else np.empty(0) for row in rows]
             values = frame[name].cat.codes if frame[name].dtype == "category" else frame[name]
             assert np.array_equal(values, np.concatenate(years)), (table, name)
@@ -107,14 +111,15 @@ def test_only_a_whole_journal_of_this_file_counts(
 @pytest.mark.parametrize("trial", range(8))
 def test_killed_at_a_random_moment(tmp_path: Path, trial: int) -> None:
     path = tmp_path / "run.h5"
-    program = f"from tests.record.years import write_until_killed as w; w({str(path)!r})"
-    process = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE)
-    assert process.stdout is not None
-    process.stdout.readline()
+    output = tmp_path / "told.txt"
+    process = start(write_until_killed, path, output=output)
+    while not (output.exists() and output.stat().st_size) and process.is_alive():
+        time.sleep(0.002)
     time.sleep(random.Random(trial).uniform(0.0, 0.25))
-    process.send_signal(signal.SIGKILL)
-    told = process.stdout.read().split()
-    process.wait()
+    process.kill()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL, output.read_text()
+    told = output.read_text().split("\n")[:-1]
     with open_run(path) as run:
         last = int(run.years[-1]) if len(run.years) else FIRST_YEAR - 1
         if last >= FIRST_YEAR:
@@ -123,34 +128,29 @@ def test_killed_at_a_random_moment(tmp_path: Path, trial: int) -> None:
     assert not told or last >= int(told[-1]) or int(told[-1]) == FIRST_YEAR + PLANTED - 1
 
 
-_LIMITED = """
-import resource, signal, sys
-from pathlib import Path
-from forest.errors import OutputError
-from tests.record.years import FIRST_YEAR, append, create
-path = Path(sys.argv[1])
-writer = create(path)
-append(writer, FIRST_YEAR, FIRST_YEAR)
-room = path.stat().st_size + int(sys.argv[2])
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
-try:
-    for year in range(FIRST_YEAR + 1, FIRST_YEAR + 25):
-        append(writer, year, year)
-        print(year, flush=True)
-except OutputError as error:
-    print(error)
-    sys.exit(2)
-"""
+def _write_in(path: Path, more: int) -> None:
+    """Write years into a file that may become so many bytes longer."""
+    writer = create(path)
+    append(writer, FIRST_YEAR, FIRST_YEAR)
+    room = path.stat().st_size + more
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+    try:
+        for year in range(FIRST_YEAR + 1, FIRST_YEAR + 25):
+            append(writer, year, year)
+            print(year, flush=True)
+    except OutputError as error:
+        print(error)
 
 
 @pytest.mark.parametrize("room", [0, 100, 5_000, 60_000])
 def test_full_disk_keeps_the_whole_years(tmp_path: Path, room: int) -> None:
     path = tmp_path / "run.h5"
-    command = [sys.executable, "-c", _LIMITED, str(path), str(room)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-    *years, message = done.stdout.splitlines()
+    output = tmp_path / "told.txt"
+    process = start(_write_in, path, room, output=output)
+    process.join()
+    *years, message = output.read_text().splitlines()
+    output.unlink()
     assert message == f"{path}: no room left on the disk"
     with open_run(path) as run:
         assert_whole(run, int(years[-1]) if years else FIRST_YEAR)

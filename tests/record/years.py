@@ -104,10 +104,10 @@ def append(writer: RunWriter, first: int, last: int) -> None:
         writer.append_year(year, make_year(year), {12: make_sample(year)})
 
 
-def write_until_killed(path: str) -> None:
+def write_until_killed(path: Path) -> None:
     """Write year after year, starting again when the trees are all dead."""
     while True:
-        with create(Path(path), overwrite=True) as writer:
+        with create(path, overwrite=True) as writer:
             for year in range(FIRST_YEAR, FIRST_YEAR + PLANTED):
                 append(writer, year, year)
                 print(year, flush=True)

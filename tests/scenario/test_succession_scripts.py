@@ -65,7 +65,7 @@ def test_a_seed_of_ones_own(tmp_path: Path) -> None:
     trees = []
     for seed in ("1", "2"):
         out = tmp_path / seed
-        bare_ground_succession.main(["--out", str(out), "--years", "12", "--seed", seed])
+        bare_ground_succession.main(["--out", str(out), "--years", "10", "--seed", seed])
         with forest.open_run(out / "bare_ground_succession.h5") as run:
             assert run.scenario.seed == int(seed)
             trees.append(run.trees)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from analysis import spacing
 from scenarios import spacing_trial, thinning_trial
 
-SMALL = ["--plot", "8", "--replicates", "1", "--threads", "1"]
+SMALL = ["--plot", "6", "--replicates", "1", "--threads", "1"]
 
 
 def _grown(script: object, out: Path, *words: str) -> Path:
@@ -19,7 +21,9 @@ def _grown(script: object, out: Path, *words: str) -> Path:
     return out
 
 
-def test_a_young_spacing_trial(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_young_spacing_trial(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     words = [*SMALL, "--years", "14"]
     _grown(spacing_trial, tmp_path, *words)
     said = capsys.readouterr().out
@@ -37,6 +41,8 @@ def test_a_young_spacing_trial(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert (tmp_path / "again.png").exists()
     before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*.h5")}
     assert len(before) == 8
+    drawn = SimpleNamespace(figure=Figure(), numbers=table)
+    monkeypatch.setattr(spacing_trial, "study", lambda *_: drawn)
     _grown(spacing_trial, tmp_path, *words)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*.h5")} == before
     with pytest.raises(SystemExit) as end:
@@ -46,7 +52,7 @@ def test_a_young_spacing_trial(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_a_young_thinning_trial(tmp_path: Path) -> None:
-    _grown(thinning_trial, tmp_path, "--plot", "12", *SMALL[2:], "--years", "30")
+    _grown(thinning_trial, tmp_path, "--plot", "8", *SMALL[2:], "--years", "30")
     assert (tmp_path / "thinning_trial.png").read_bytes().startswith(b"\x89PNG")
     table = pd.read_csv(tmp_path / "thinning_trial.csv").set_index("way")
     assert table.index.tolist() == list(thinning_trial.WAYS)

@@ -21,7 +21,7 @@ from forest.surface.bark.maps import BarkMaps, bark_maps
 from forest.surface.bark.noise import flakes, noise
 from forest.surface.bark.presets import Preset, preset_names
 from forest.surface.bark.recipes import Recipe
-from forest.surface.bark.textures import Texture
+from forest.surface.bark.textures import Texture, _paint
 from forest.view.bark_picture import lit
 
 PRESETS = ("aspen", "beech", "birch", "maple", "oak", "pine", "spruce")
@@ -227,6 +227,14 @@ def test_flakes_cover_everything() -> None:
     assert 10 < len(np.unique(found.tint)) <= 25
     for column in found:
         assert 0.0 <= column.min() <= column.max() <= 1.0
+
+
+def test_a_tile_is_painted_once_and_would_be_the_same_again() -> None:
+    recipe = Preset.load("maple").skin[0]
+    one, same, other = (Texture.of(recipe, seed=seed, size=64).pixels for seed in (3, 3, 4))
+    assert same is one
+    assert np.array_equal(_paint.__wrapped__(recipe, 3, 64), one)
+    assert not np.array_equal(other, one)
 
 
 def test_users_pictures(tmp_path: Path) -> None:

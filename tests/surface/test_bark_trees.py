@@ -409,12 +409,11 @@ def test_plates_tear_again_over_the_years() -> None:
     pine = Preset.load("pine")
     grown = bark_tree(tree, pine, 1, wood=wood_of(tree, 16), strip_m=STRIP)
     assert grown.bark.surface is not None
-    share = [
-        grown.at(year).bark.elements.width[grown.at(year).bark.elements.kind == FRACTURE].sum()
-        for year in (2006, 2010, 2016)
-    ]
+    moments = [grown.at(year) for year in (2006, 2010, 2016)]
+    elements = [moment.bark.elements for moment in moments]
+    share = [e.width[e.kind == FRACTURE].sum() for e in elements]
     assert share[0] <= share[1] <= share[2]
-    grown.at(2010).maps(64, axes=(0,))
+    moments[1].maps(64, axes=(0,))
 
 
 def test_plates_tear_more_on_the_thick_side() -> None:

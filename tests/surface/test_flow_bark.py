@@ -57,7 +57,7 @@ def healed() -> dict[float, list[HealedYear]]:
     found = {}
     for radius in (0.03, 0.05):
         skeleton, wound = _stubbed(radius)
-        found[radius] = heal(skeleton, wound, RINGS, spacing_m=0.3 * radius)
+        found[radius] = heal(skeleton, wound, RINGS, spacing_m=0.4 * radius)
     return found
 
 
@@ -67,7 +67,7 @@ def flush() -> dict[float, list[HealedYear]]:
     found = {}
     for radius in (0.03, 0.05):
         skeleton, wound = _stubbed(radius, 0.05)
-        found[radius] = heal(skeleton, wound, np.full(4, RING), spacing_m=0.3 * radius)
+        found[radius] = heal(skeleton, wound, np.full(4, RING), spacing_m=0.4 * radius)
     return found
 
 
@@ -293,7 +293,7 @@ def test_ribbons_follow_the_grain_in_layers(maple: FlowBark) -> None:
 
 
 def test_bark_hangs_on_age_and_seed() -> None:
-    skeleton = pole(0.1, 0.4)
+    skeleton = pole(0.1, 0.2)
     young, old, other, same = (
         features(skeleton, "quaking_aspen", age=age, seed=seed, grain_of_flow=False)
         for age, seed in ((10.0, 0), (70.0, 0), (70.0, 1), (70.0, 0))
@@ -305,7 +305,7 @@ def test_bark_hangs_on_age_and_seed() -> None:
 
 
 def test_bark_is_as_old_as_its_internode() -> None:
-    skeleton = pole(0.1, 0.8)
+    skeleton = pole(0.06, 0.8)
     years = np.arange(2000, 2080, 10).astype(np.int32)
     bark = features(
         replace(skeleton, birth_year=years), "quaking_aspen", year=2080, grain_of_flow=False

@@ -12,7 +12,8 @@ from PIL import Image, ImageSequence
 
 from forest.record.run import open_run
 from forest.view import film, tree_movie
-from forest.view.movie import FilmSettings, film_stand
+from forest.view.film import FilmSettings
+from forest.view.movie import film_stand
 from forest.view.stand_years import StandYears
 from forest.view.tree_colours import COLOURS, FATE_COLOURS, TreeColours
 from tests.tiny import YEARS, forest, write_tiny
@@ -154,7 +155,10 @@ def test_colours_are_on_one_scale(run_file: Path, by: str) -> None:
         (("--to", "a.gif", "--tree", 1, "--year", 1990), "2001 to 2008"),
         (("--to", "a.gif", "--tree", 1, "--shape", "messh"), "did you mean 'mesh'?"),
         (("--to", "a.gif", "--tree", 1, "--to-year", 2003), "films of a stand"),
+        (("--to", "a.gif", "--tree", 1, "--view", "side"), "--view is for films of a stand"),
         (("--to", "a.gif", "--grow"), "--tree ID"),
+        (("--to", "a.gif", "--shape", "skeleton"), "--shape is for films of a tree"),
+        (("--to", "a.gif", "--no-leaves"), "--leaves is for films of a tree"),
         (("--to", "a.gif", "--fps", 0), "0.5 to 60"),
         (("--to", "a.gif", "--fps", "nan"), "0.5 to 60"),
         (("--to", "a.gif", "--seconds", 3600, "--fps", 60), "20,000 at most"),

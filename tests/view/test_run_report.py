@@ -254,14 +254,19 @@ def test_a_run_of_few_tables_and_years(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_read_is_left_out_and_said(
-    made: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    toml, path = tmp_path / "tiny.toml", tmp_path / "run.h5"
+    toml.write_text(TOML)
+    few = ("--set", "years=2", "--set", "output.sample_trees={}")
+    assert forest("run", toml, "--out", path, *few)[0] == 0
+
     def damaged(run: Run) -> None:
         raise InputError("is damaged: <events>", where=str(run.path))
 
     monkeypatch.setattr(Run, "ledger", property(damaged))
     to = tmp_path / "report.html"
-    code, _, err = forest("report", made[0], "--to", to)
+    code, _, err = forest("report", path, "--to", to)
     assert code == 0
     assert "left out" in err
     page = Page(to.read_text(encoding="utf-8"))

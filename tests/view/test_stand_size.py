@@ -72,8 +72,9 @@ def test_drawing_in_chunks_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     view = StandView(row(2))
     whole = view.picture()
     frame = view.frame(view.scenery.camera())
-    assert len(frame.triangles) > 500
-    monkeypatch.setattr(stand_view, "_CHUNK", 500)
+    chunk = len(frame.triangles) // 3
+    assert chunk > 100
+    monkeypatch.setattr(stand_view, "_CHUNK", chunk)
     apart = view.picture()
     assert np.mean(np.any(whole != apart, axis=2)) < 0.01
     assert whole.std() > 20.0
@@ -90,10 +91,10 @@ def test_too_much_in_view_is_refused_before_it_is_made(monkeypatch: pytest.Monke
         view.picture()
 
 
-def test_a_million_trees_are_refused_at_once() -> None:
+def test_a_quarter_of_a_million_trees_are_refused_at_once() -> None:
     scenery = row(1)
     many = Instances.of(
-        np.zeros(1_000_000), np.tile(scenery.instances.place, (1_000_000, 1)), np.ones(1_000_000)
+        np.zeros(250_000), np.tile(scenery.instances.place, (250_000, 1)), np.ones(250_000)
     )
     with pytest.raises(InputError, match="in view"):
         frames.prepare(scenery.models, many, scenery.camera())

@@ -86,13 +86,21 @@ def test_the_command_writes_a_sample_tree(run_file: Path, tmp_path: Path, suffix
     assert (code, err) == (0, "")
     assert "tree 1 in 2008" in out
     assert to.stat().st_size > 1000
-    assert forest("mesh", run_file, "--tree", "1", "--to", to)[0] == 2  # exists already
-    assert forest("mesh", run_file, "--tree", "1", "--to", to, "--force")[0] == 0
     if suffix == ".ply":
         bare, green = trimesh.load(to), tmp_path / "green.ply"
         assert bare.is_watertight
         forest("mesh", run_file, "--tree", "1", "--to", green, "--leaves")
         assert len(trimesh.load(green, process=False).faces) > len(bare.faces)
+
+
+def test_the_command_writes_over_nothing_unasked(run_file: Path, tmp_path: Path) -> None:
+    for to in (tmp_path / "tree.ply", tmp_path / "tree.png"):  # a mesh, and a picture of it
+        to.write_text("mine")
+        words = ("mesh", run_file, "--tree", "1", "--kind", "tubes", "--to", to)
+        assert forest(*words)[0] == 2
+        assert to.read_text() == "mine"
+        assert forest(*words, "--force")[0] == 0
+        assert to.stat().st_size > 1000
 
 
 def test_a_seedling_is_written_as_tubes(
@@ -138,10 +146,10 @@ def test_the_command_blends_as_it_is_told(
     ]
     to, volumes = tmp_path / "tree.ply", set()
     for words, same in said:
-        given = ("--year", "2004", "--cell", "0.0095", "--to", to, "--force", *words)
+        given = ("--year", "2004", "--cell", "0.011", "--to", to, "--force", *words)
         assert forest("mesh", run_file, "--tree", "1", *given)[0] == 0
         volume = trimesh.load(to).volume
-        assert volume == pytest.approx(blended(tree, cell_m=0.0095, **same).volume, rel=1e-6)
+        assert volume == pytest.approx(blended(tree, cell_m=0.011, **same).volume, rel=1e-6)
         volumes.add(round(volume, 8))
     assert len(volumes) == len(said), volumes
 

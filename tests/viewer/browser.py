@@ -95,7 +95,7 @@ def still(page: Any) -> bytes:
     """Wait until the picture no longer changes, and give it."""
     before, end = b"", time.monotonic() + 60.0
     while time.monotonic() < end:
-        page.wait_for_timeout(250)
+        page.wait_for_timeout(150)
         now = bytes(page.locator("#picture").screenshot())
         if now == before:
             return now

@@ -109,8 +109,8 @@ def _drag(page: Any, start: tuple[float, float], *via: tuple[float, float]) -> N
 
 def _a_branch(page: Any) -> tuple[float, float, int, int]:
     """Click about until a branch lights up that is no whole tree: where, its tree and metamer."""
-    for down in [0.38 + 0.02 * k for k in range(14)]:
-        for across in (0.2, 0.22, 0.5, 0.52, 0.24, 0.18, 0.8, 0.82):
+    for across in (0.5, 0.2, 0.22, 0.52, 0.24, 0.18, 0.8, 0.82):
+        for down in [0.38 + 0.02 * k for k in range(14)]:
             _click(page, across, down)
             page.wait_for_timeout(120)
             if not page.locator("#prune-lit").count():

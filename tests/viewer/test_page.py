@@ -14,6 +14,8 @@ from forest.viewer.source import RunSource
 from forest.viewer.stage import Stage
 from tests.viewer.browser import Viewing, changed, open_page, still, wait_for_text
 
+_SAMPLE, _PLAIN = 4, 2  # a sample tree, and one that is none
+
 
 @pytest.fixture(scope="module")
 def page(browser: Any, viewing: Viewing) -> Any:
@@ -167,6 +169,31 @@ def test_a_second_page_and_one_opened_later_show_the_same(
     assert later.inner_text("#year") == "2006"
     assert later.complaints == []
     later.close()
+
+
+def test_the_card_shows_surfaces_and_says_why_not(viewing: Viewing, browser: Any) -> None:
+    page = open_page(browser, viewing.address)
+    page.click(".v-tab:has-text('Tree')")
+    page.fill("#find", str(_SAMPLE))
+    page.click("#find-button")
+    wait_for_text(page, "#card-title", f"Tree {_SAMPLE} ")
+    page.click("#look-tree")
+    branches = still(page)
+    page.click("#shape-tubes")
+    wait_for_text(page, "#shape-said", "triangles")
+    surface = changed(page, branches)
+    page.click("#shape-body")
+    changed(page, surface)
+    page.click("#shape-bark")
+    wait_for_text(page, "#shape-said", "no bark that could be seen")
+    page.wait_for_timeout(500)
+    assert "no bark that could be seen" in page.inner_text("#shape-said")  # and it stays
+    page.fill("#find", str(_PLAIN))
+    page.click("#find-button")
+    wait_for_text(page, "#shape-said", "not on record")
+    assert page.locator("#shape-bark").is_disabled()
+    assert page.complaints == []
+    page.close()
 
 
 def test_the_page_never_complained(page: Any) -> None:

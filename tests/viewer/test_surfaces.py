@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from forest.surface.mesh import Mesh
 from forest.surface.tubes import tubes
 from forest.viewer.source import RunSource
 from forest.viewer.surfaces import _unbumped
-from tests.viewer.browser import Viewing, changed, open_page, still, wait_for_text
 
 _SAMPLE, _PLAIN = 4, 2
 
@@ -76,28 +74,3 @@ def test_the_chosen_and_the_near_have_branches(run_path: Path) -> None:
         app.state.branches = True
         app.show_year()
         assert app.stage.skeletons == tuple(known)
-
-
-def test_the_card_shows_surfaces_and_says_why_not(viewing: Viewing, browser: Any) -> None:
-    page = open_page(browser, viewing.address)
-    page.click(".v-tab:has-text('Tree')")
-    page.fill("#find", str(_SAMPLE))
-    page.click("#find-button")
-    wait_for_text(page, "#card-title", f"Tree {_SAMPLE} ")
-    page.click("#look-tree")
-    branches = still(page)
-    page.click("#shape-tubes")
-    wait_for_text(page, "#shape-said", "triangles")
-    surface = changed(page, branches)
-    page.click("#shape-body")
-    changed(page, surface)
-    page.click("#shape-bark")
-    wait_for_text(page, "#shape-said", "no bark that could be seen")
-    page.wait_for_timeout(500)
-    assert "no bark that could be seen" in page.inner_text("#shape-said")  # and it stays
-    page.fill("#find", str(_PLAIN))
-    page.click("#find-button")
-    wait_for_text(page, "#shape-said", "not on record")
-    assert page.locator("#shape-bark").is_disabled()
-    assert page.complaints == []
-    page.close()

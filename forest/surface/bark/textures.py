@@ -6,6 +6,7 @@ A tile repeats in both directions. Noise, fibres, flakes, scattered marks and mi
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -99,6 +100,7 @@ class Texture(NamedTuple):
         return cls(_paint(recipe, seed, size), (recipe.size_m, recipe.size_m))
 
 
+@lru_cache(maxsize=4)  # those of one preset: axes, years and trees are dressed one by one
 def _paint(recipe: Recipe, seed: int, n: int) -> _Pixels:
     side = 1e3 * recipe.size_m
 

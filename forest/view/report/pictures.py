@@ -71,10 +71,13 @@ def stand_pictures(run: Run) -> tuple[list[Picture], list[Picture]]:
     made: list[list[Picture]] = []
     for view, window in (("side", _WINDOW), ("above", _MAP)):
         pictures = []
-        with Stage(size_m, tall, window=window, view=view, conifers=conifers_of(run)) as stage:
+        with Stage(
+            size_m, tall, window=window, view=view, conifers=conifers_of(run.scenario)
+        ) as stage:
             for year, trees in frames.items():
-                image = Image.fromarray(stage.picture(trees, colours))
-                grown = trees[trees["tree_id"] > 0]
+                shown = stage.picture(trees, colours, obstacles=stands.obstacles(year))
+                image = Image.fromarray(shown)
+                grown = trees[(trees["tree_id"] > 0) & (trees["fate"] == "")]
                 counts = grown["species"].astype(str).value_counts()
                 of = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in counts.items() if n)
                 where = "from the side" if view == "side" else "from above"
@@ -119,7 +122,7 @@ def disc_picture(run: Run, tree_id: int, year: int) -> Picture | None:
         return None
     with TemporaryDirectory() as folder:
         to = Path(folder) / "disc.png"
-        draw_disc(disc, to, conifer=disc.species in conifers_of(run))
+        draw_disc(disc, to, conifer=disc.species in conifers_of(run.scenario))
         data = _from_file(to, _DISC_PX)
     rings = int(np.count_nonzero(disc.ring_widths))
     thick = 200.0 * (disc.radius + disc.bark_thickness)
