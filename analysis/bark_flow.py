@@ -15,8 +15,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from forest.surface.blend.cones import limbs_of  # noqa: E402
 from forest.surface.blend.field import Blend  # noqa: E402
+from forest.surface.blend.limbs import limbs_of  # noqa: E402
 from forest.surface.flow import (  # noqa: E402
     Flow,
     Loops,

@@ -16,7 +16,7 @@ import numpy as np  # noqa: E402
 
 from forest.surface.blend import Blend, Reaction, blend_of, blended  # noqa: E402
 from forest.surface.blend.cells import cells_near, lattice_of  # noqa: E402
-from forest.surface.blend.cones import Joints  # noqa: E402
+from forest.surface.blend.joints import Joints  # noqa: E402
 from forest.surface.blend.polygonise import march  # noqa: E402
 from forest.surface.mesh import Mesh  # noqa: E402
 from forest.trees.skeleton import Skeleton  # noqa: E402

@@ -101,6 +101,14 @@ def njit(function: F) -> F:
     return numba.njit(**_OPTIONS, _nrt=True)(function)  # type: ignore[no-any-return]
 
 
+def inlined(function: F) -> F:
+    """Compile a small kernel that becomes part of each kernel that calls it.
+
+    Handing a NamedTuple of arrays to a function can cost more than what that function does.
+    """
+    return numba.njit(**_OPTIONS, _nrt=True, forceinline=True)(function)  # type: ignore[no-any-return]
+
+
 def driver(function: F) -> F:
     """Compile a kernel that `forest._threads.in_threads` runs over its chunks.
 

@@ -119,7 +119,8 @@ def leaves_of(skeleton: Skeleton, species: Species, *, per_site: int = 1) -> Lea
     (`leaves.area_m2` of its species). Broadleaves bear oval blades at the upper end of the
     internode, one and a half times as long as wide, a golden angle from one to the next; conifers
     bear sprays of needles along the internode, as long as it, but never wider than long. The upper
-    face is turned to the sky as far as the direction allows.
+    face is turned to the sky as far as the direction allows. What would reach from
+    above the ground, the height at which the tree starts, to below it is lifted so far.
 
     Parameters
     ----------
@@ -159,8 +160,10 @@ def leaves_of(skeleton: Skeleton, species: Species, *, per_site: int = 1) -> Lea
         length = np.maximum(shoot_length, np.sqrt(product))
     else:
         length = np.full(len(sites), np.sqrt(product * _BLADE_SLENDERNESS))
+    position = skeleton.start[sites] if needles else skeleton.end[sites]
+    direction = _off_the_ground(direction, position[:, 2] - skeleton.start[:1, 2], length)
     return Leaves(
-        position=skeleton.start[sites] if needles else skeleton.end[sites],
+        position=position,
         direction=direction,
         normal=_towards_sky(direction),
         length=length,
@@ -177,6 +180,19 @@ def _turned_off(
     side = _unit_or(np.cross(heading, _UP), np.array([1.0, 0.0, 0.0]))
     across = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(heading, side)
     return np.asarray(np.cos(angle) * heading + np.sin(angle) * across, dtype=np.float64)
+
+
+def _off_the_ground(
+    direction: NDArray[np.float64], height: NDArray[np.float64], length: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Lift directions in which a leaf that is above the ground would end below it, just so far."""
+    least = np.maximum(-height / length, -1.0)
+    low = np.flatnonzero((height >= 0.0) & (direction[:, 2] < least))
+    lifted = direction.copy()
+    level = _unit_or(direction[low] * (1.0, 1.0, 0.0), np.array([1.0, 0.0, 0.0]))
+    lifted[low] = np.sqrt(1.0 - least[low] ** 2)[:, None] * level
+    lifted[low, 2] = least[low]
+    return lifted
 
 
 def _towards_sky(direction: NDArray[np.float64]) -> NDArray[np.float64]:

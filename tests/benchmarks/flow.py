@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from forest.parametric import grow
-from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
+from forest.surface.blend.limbs import limbs_of
 from forest.surface.flow import features, flow, heal, prune
 from forest.surface.flow.flowing import RECORD_EVERY
 from tests.surface.limbs import branched, pole

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from forest.surface.blend.cones import Cones, Joints
+from forest.surface.blend.cones import Cones
 from forest.surface.blend.field import _SOFT
+from forest.surface.blend.joints import Joints
 
 
 def fade(t: float) -> float:

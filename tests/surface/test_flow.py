@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from forest._threads import using_threads
 from forest.errors import InputError
 from forest.surface.blend.around import empty_around, gather, kin_of, value_around
-from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
+from forest.surface.blend.limbs import limbs_of
 from forest.surface.flow import Flow, FlowRules, angle_to_limb, flow, grain
 from forest.surface.flow.chain import FLOWING, _push, empty_chain
 from forest.surface.flow.relink import relink

@@ -12,8 +12,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from forest.errors import InputError
-from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
+from forest.surface.blend.limbs import limbs_of
 from forest.surface.export import write_mesh
 from forest.surface.flow import (
     FlowBark,

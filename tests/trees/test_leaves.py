@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -60,6 +62,8 @@ def test_grown_trees_have_the_leaf_area_that_they_are_measured_with() -> None:
 
 def test_needles_lie_along_the_shoot_and_blades_stand_at_its_end() -> None:
     tree = bush(3, 40)
+    deep = tree.start - 10.0 * (np.arange(len(tree)) == 0)[:, None]
+    tree = dataclasses.replace(tree, start=deep)  # no leaf reaches the ground
     sites = np.repeat(np.arange(len(tree)), living_sites(tree))
     at = np.flatnonzero(tree.length[sites] > 0.0)
     sites = sites[at]
@@ -83,6 +87,18 @@ def test_outlines_fill_their_box_and_are_filled_by_fans(name: str) -> None:
     fan = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     assert (fan > 0.0).all()
     assert outline_area(outline) == pytest.approx(fan.sum())
+
+
+def test_leaves_of_low_shoots_lie_on_the_ground() -> None:
+    tree = bush(4, 40)
+    low = dataclasses.replace(
+        tree, start=tree.start * (1.0, 1.0, 0.01), end=np.abs(tree.end * (1.0, 1.0, 0.01))
+    )
+    for species in SPECIES.values():
+        leaves = leaves_of(low, species)
+        above = leaves.position[:, 2] >= low.start[0, 2]
+        tip = (leaves.position + leaves.length[:, None] * leaves.direction)[above, 2]
+        assert tip.min() == pytest.approx(low.start[0, 2], abs=1e-12)  # some were lifted
 
 
 def test_a_bare_tree_has_none() -> None:

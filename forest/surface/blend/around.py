@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
-from forest.surface.blend.cones import Limbs
+from forest.surface.blend.limbs import Limbs
 from forest.surface.blend.field import cone, joint, smooth_least, value
 from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
 

@@ -19,8 +19,8 @@ from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.errors import InputError
 from forest.surface.blend.cones import Cones
-from forest.surface.blend.field import Blend, cone, value
-from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
+from forest.surface.blend.field import Blend, cone, joint, value
+from forest.surface.blend.tree_of_boxes import visit
 
 _Keys = NDArray[np.int64]
 
@@ -28,6 +28,8 @@ _Keys = NDArray[np.int64]
 CELLS_IN_RADIUS = 4.0
 #: The greatest slope of the field that cells reckon with; raised where the mesh is not closed.
 SLOPE = 1.3
+#: Where a blend moves the surface by this part of the thinner limb's radius, cells suit that one.
+_BLENDED = 0.05
 #: Bytes that a cell takes while its surface is made.
 BYTES_PER_CELL = 700
 _CHUNKS = 64
@@ -142,21 +144,30 @@ def _thinnest(field: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
     """Radius of the thinnest limb whose own surface may pass within `reach`; inf for none."""
     best = np.inf
     node = np.int64(1)
-    leaves = field.boxes.leaves[0]
     while node > 0:
-        if distance_to_box(field.boxes, node, x, y, z) > reach:
-            node = past(node)
-            continue
-        if node < leaves:
-            node *= 2
-            continue
-        first = (node - leaves) * PER_LEAF
-        for k in range(first, min(first + PER_LEAF, len(field.boxes.item))):
-            i = field.boxes.item[k]
-            away, radius, _, _, _, _ = cone(field.cones, i, x, y, z)
+        first, last, node = visit(field.boxes, node, x, y, z, reach)
+        for k in range(first, last):
+            away, radius, _, _, _, _ = cone(field.cones, field.boxes.item[k], x, y, z)
             if abs(away) <= reach:
                 best = min(best, radius)
-        node = past(node)
+    return best
+
+
+@njit
+def _thinnest_blended(field: Any, x: Any, y: Any, z: Any) -> Any:
+    """Radius of the thinnest limb whose blend bears on a point; inf for none."""
+    joints = field.joints
+    best = np.inf
+    node = np.int64(1)
+    while node > 0:
+        first, last, node = visit(field.places, node, x, y, z, 0.0)
+        for k in range(first, last):
+            place = field.places.item[k]
+            for j in range(joints.place[place], joints.place[place + 1]):
+                if joints.thin[j] < best:
+                    blended, plain, _ = joint(field, j, x, y, z)
+                    if plain - blended > _BLENDED * joints.thin[j]:
+                        best = joints.thin[j]
     return best
 
 
@@ -173,6 +184,7 @@ def _judge(
             near[i] = abs(f) <= slope * reach
             if near[i] and len(thin):
                 thin[i] = _thinnest(field, p[0], p[1], p[2], 1.2 * reach)
+                thin[i] = min(thin[i], _thinnest_blended(field, p[0], p[1], p[2]))
 
 
 _CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], np.int64)

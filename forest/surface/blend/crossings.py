@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from forest._jit import njit
 from forest.surface.blend.field import Blend, nearest
-from forest.surface.blend.tree_of_boxes import PER_LEAF, past
+from forest.surface.blend.tree_of_boxes import visit
 
 #: Meetings this near to one of the limbs' joints, in its reach, are part of the branching.
 _AT_JOINT = 1.0
@@ -49,24 +49,14 @@ def _cross(field: Any, starts: Any, listed: Any, pair: Any) -> Any:
     cones = field.cones
     boxes = field.boxes
     found = np.int64(0)
-    leaves = boxes.leaves[0]
     for i in range(len(cones.low)):
-        r = max(cones.low[i], cones.high[i])
+        m = 0.5 * (cones.start[i] + cones.end[i])
+        span = cones.end[i] - cones.start[i]
+        reach = 0.5 * np.sqrt(np.sum(span * span)) + max(cones.low[i], cones.high[i])
         node = np.int64(1)
         while node > 0:
-            apart = False
-            for k in range(3):
-                low = min(cones.start[i, k], cones.end[i, k]) - r
-                high = max(cones.start[i, k], cones.end[i, k]) + r
-                apart = apart or boxes.low[node, k] > high or boxes.high[node, k] < low
-            if apart:
-                node = past(node)
-                continue
-            if node < leaves:
-                node *= 2
-                continue
-            first = (node - leaves) * PER_LEAF
-            for k in range(first, min(first + PER_LEAF, len(boxes.item))):
+            first, last, node = visit(boxes, node, m[0], m[1], m[2], reach)
+            for k in range(first, last):
                 o = boxes.item[k]
                 if cones.axis[o] <= cones.axis[i]:
                     continue
@@ -89,7 +79,6 @@ def _cross(field: Any, starts: Any, listed: Any, pair: Any) -> Any:
                 if found < len(pair):
                     pair[found, 0], pair[found, 1] = cones.axis[i], cones.axis[o]
                 found += 1
-            node = past(node)
     return found
 
 

@@ -17,8 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from forest._jit import driver, njit
 from forest._threads import in_threads
 from forest.mechanics.branch_points import fall_off
-from forest.surface.blend.cones import Cones, Joints, Limbs
-from forest.surface.blend.tree_of_boxes import PER_LEAF, Boxes, boxes_of, distance_to_box, past
+from forest.surface.blend.cones import Cones
+from forest.surface.blend.joints import Joints
+from forest.surface.blend.limbs import Limbs
+from forest.surface.blend.tree_of_boxes import Boxes, boxes_of, visit
 
 _Floats = NDArray[np.float64]
 
@@ -201,16 +203,9 @@ def _blend(field: Any, plain: Any, x: Any, y: Any, z: Any) -> Any:
     best = plain
     moved = total = 0.0
     node = np.int64(1)
-    leaves = field.places.leaves[0]
     while node > 0:
-        if distance_to_box(field.places, node, x, y, z) > 0.0:
-            node = past(node)
-            continue
-        if node < leaves:
-            node *= 2
-            continue
-        first = (node - leaves) * PER_LEAF
-        for k in range(first, min(first + PER_LEAF, len(field.places.item))):
+        first, last, node = visit(field.places, node, x, y, z, 0.0)
+        for k in range(first, last):
             place = field.places.item[k]
             here = np.inf
             for j in range(joints.place[place], joints.place[place + 1]):
@@ -220,7 +215,6 @@ def _blend(field: Any, plain: Any, x: Any, y: Any, z: Any) -> Any:
                     moved += share * (value - unblended)
                     total += share
             best = min(best, here)
-        node = past(node)
     if field.printed[0]:
         return plain + moved / total if total > 0.0 else plain
     return best
@@ -232,22 +226,14 @@ def nearest(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
     best = cone(field.cones, hint, x, y, z)[0]
     which = np.int64(hint)
     node = np.int64(1)
-    leaves = field.boxes.leaves[0]
     while node > 0:
-        if distance_to_box(field.boxes, node, x, y, z) > max(best, 0.0):
-            node = past(node)
-            continue
-        if node < leaves:
-            node *= 2
-            continue
-        first = (node - leaves) * PER_LEAF
-        for k in range(first, min(first + PER_LEAF, len(field.boxes.item))):
+        first, last, node = visit(field.boxes, node, x, y, z, max(best, 0.0))
+        for k in range(first, last):
             i = field.boxes.item[k]
             value = cone(field.cones, i, x, y, z)[0]
             if value < best or (value == best and i < which):
                 best = value
                 which = i
-        node = past(node)
     return best, which
 
 
@@ -286,7 +272,7 @@ def slope_alone(cones: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
 
 
 @njit
-def _slope(field: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
+def slope(field: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
     """The function's slope (3): the nearest cone's where that alone makes f, else differences."""
     alone, gx, gy, gz = slope_alone(field.cones, x, y, z, f, i)
     if not alone:
@@ -300,6 +286,7 @@ def _slope(field: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
 def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: Any) -> Any:
     """Move a point onto the surface by Newton steps of at most `most` metres each.
 
+    Gives where it is then (3), the function there, and the cone nearest to it.
     The slope is taken anew only where the last step brought less than three quarters of the way.
     """
     f, which = value(field, x, y, z, hint)
@@ -310,7 +297,7 @@ def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: 
         if abs(f) < _CLOSE:
             break
         if fresh:
-            gx, gy, gz = _slope(field, x, y, z, f, which)
+            gx, gy, gz = slope(field, x, y, z, f, which)
             square = max(gx * gx + gy * gy + gz * gz, 0.01)
         step = f / square
         size = abs(step) * np.sqrt(gx * gx + gy * gy + gz * gz)
@@ -320,7 +307,7 @@ def on_surface(field: Any, x: Any, y: Any, z: Any, hint: Any, steps: Any, most: 
         before = abs(f)
         f, which = value(field, x, y, z, which)
         fresh = abs(f) > 0.25 * before
-    return x, y, z, which
+    return x, y, z, f, which
 
 
 @driver
@@ -350,7 +337,7 @@ def _project(first: Any, step: Any, field: Any, points: Any, steps: Any, most: A
         hint = np.int64(0)
         for i in range(len(points) * c // _CHUNKS, len(points) * (c + 1) // _CHUNKS):
             p = points[i]
-            x, y, z, hint = on_surface(field, p[0], p[1], p[2], hint, steps, most)
+            x, y, z, _, hint = on_surface(field, p[0], p[1], p[2], hint, steps, most)
             p[0], p[1], p[2] = x, y, z
 
 

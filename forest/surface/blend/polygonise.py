@@ -1,4 +1,4 @@
-"""From cells near the surface to triangles whose points lie on it."""
+"""From cells near the surface to triangles."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from forest._jit import driver
 from forest._threads import in_threads
 from forest.surface.blend.cells import Lattice, pack, unpack
 from forest.surface.blend.dual import FACES, POINTS, VERTEX_BITS, loops, polygons
-from forest.surface.blend.field import Blend, on_surface, value
+from forest.surface.blend.field import Blend, value
+from forest.surface.blend.settling import settled
 
 _Keys = NDArray[np.int64]
 _CHUNKS = 64
@@ -68,18 +69,6 @@ def members_of(points: _Keys, leaves: list[_Keys], inside: NDArray[np.bool_]) ->
 
 
 @driver
-def _settle(
-    first: Any, step: Any, field: Any, points: Any, most: Any, steps: Any, hints: Any
-) -> None:
-    for c in range(first, _CHUNKS, step):
-        for i in range(len(points) * c // _CHUNKS, len(points) * (c + 1) // _CHUNKS):
-            x, y, z, hints[i] = on_surface(
-                field, points[i, 0], points[i, 1], points[i, 2], hints[i], steps, most[i]
-            )
-            points[i, 0], points[i, 1], points[i, 2] = x, y, z
-
-
-@driver
 def _values(first: Any, step: Any, field: Any, points: Any, out: Any, hints: Any) -> None:
     for c in range(first, _CHUNKS, step):
         hint = np.int64(0)
@@ -96,7 +85,7 @@ def march(
     Returns
     -------
     points : float64 (n, 3)
-        On the surface, m.
+        On the surface, or as far off it as `settled` says, m.
     triangles : int32 (m, 3)
         Anticlockwise from outside. Closed if no cell is missing.
     """
@@ -108,7 +97,7 @@ def march(
     del keys
     points, triangles, room, hints = sheets(members, f, places, near, lattice.unit)
     del members, places, f, near
-    return _even(blend, points, triangles, room, hints), triangles
+    return settled(blend, points, triangles, room, hints), triangles
 
 
 def sheets(
@@ -171,31 +160,3 @@ def _vertices(
     hints = np.concatenate((hints, np.zeros(len(pairs), np.int64)))
     room = np.concatenate((room, np.full(len(pairs), 0.5 * unit)))
     return np.concatenate((points, between[index])), room, hints, record, int(size[0])
-
-
-#: Rounds in which vertices move towards the middle of their neighbours, along the surface.
-_ROUNDS = 4
-
-
-def _even(
-    blend: Blend,
-    points: NDArray[np.float64],
-    triangles: NDArray[np.int32],
-    room: NDArray[np.float64],
-    hints: _Keys,
-) -> NDArray[np.float64]:
-    """Even out the triangles near the surface, then pull their vertices onto it."""
-    count = np.bincount(triangles.ravel(), minlength=len(points))[:, None].astype(np.float64)
-    for _ in range(_ROUNDS):
-        middle = np.zeros_like(points)
-        for k in range(3):
-            for axis in range(3):
-                around = points[triangles[:, (k + 1) % 3], axis]
-                around = around + points[triangles[:, (k + 2) % 3], axis]
-                middle[:, axis] += np.bincount(triangles[:, k], around, minlength=len(points))
-        step = 0.5 * (middle / (2.0 * count) - points)
-        size = np.linalg.norm(step, axis=1)
-        step *= np.minimum(1.0, 0.5 * room / np.maximum(size, 1e-12))[:, None]
-        points = points + step
-    in_threads(_settle, blend.kernel, points, room, np.int64(6), hints)
-    return points

@@ -7,7 +7,8 @@ import numpy as np
 from forest.growth.parameters import support
 from forest.mechanics.branch_points import support_offset, widening
 from forest.species import Species
-from forest.surface.blend.cones import Reaction, sound
+from forest.surface.blend.cones import sound
+from forest.surface.blend.limbs import Reaction
 from forest.trees.skeleton import Skeleton
 
 

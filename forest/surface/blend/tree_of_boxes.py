@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from forest._jit import njit
+from forest._jit import inlined
 
 PER_LEAF = 4
 
@@ -63,8 +63,8 @@ def boxes_of(low: NDArray[np.float64], high: NDArray[np.float64]) -> Boxes:
     return Boxes(lower, upper, item.astype(np.int64), np.array([leaves], np.int64))
 
 
-@njit
-def distance_to_box(boxes: Any, node: Any, x: Any, y: Any, z: Any) -> Any:
+@inlined
+def _distance(boxes: Any, node: Any, x: Any, y: Any, z: Any) -> Any:
     """Distance of a point from a node's box; 0 within, inf where the box is empty."""
     dx = max(boxes.low[node, 0] - x, 0.0, x - boxes.high[node, 0])
     dy = max(boxes.low[node, 1] - y, 0.0, y - boxes.high[node, 1])
@@ -72,9 +72,23 @@ def distance_to_box(boxes: Any, node: Any, x: Any, y: Any, z: Any) -> Any:
     return np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@njit
-def past(node: Any) -> Any:
-    """Give the node to visit once one and all below it are done; 0 at the end."""
+@inlined
+def visit(boxes: Any, node: Any, x: Any, y: Any, z: Any, reach: Any) -> Any:
+    """Take one step of a walk over what comes within reach of a point; it starts at node 1.
+
+    Returns
+    -------
+    tuple
+        First and one past the last of `boxes.item` to look at now, often none; and the node to
+        visit next, 0 at the end. The reach may change on the way.
+    """
+    none = np.int64(0)
+    leaves = boxes.leaves[0]
+    near = _distance(boxes, node, x, y, z) <= reach
+    if near and node < leaves:
+        return none, none, 2 * node
+    first = (node - leaves) * PER_LEAF if near else none
+    last = min(first + PER_LEAF, len(boxes.item)) if near else none
     while node & 1:
         node >>= 1
-    return node + 1 if node > 0 else node
+    return first, last, node + 1 if node > 0 else node

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
-from forest.surface.blend.cones import _merge
+from forest.surface.blend.cones import merge
 from forest.surface.blend.field import Blend, value
 from forest.trees.skeleton import Skeleton
 
@@ -164,7 +164,7 @@ def _lay_rings(lines: Any, begin: Any, floor: Any, first: Any, centre: Any, acro
         length = lines.along[high - 1]
         n = high - low
         keep = np.empty(n, np.bool_)
-        _merge(lines.point[low:high], np.maximum(lines.radius[low:high], floor), _TOLERANCE, keep)
+        merge(lines.point[low:high], np.maximum(lines.radius[low:high], floor), _TOLERANCE, keep)
         at = np.empty(n + 2)
         at[0] = begin[q]
         m = 1

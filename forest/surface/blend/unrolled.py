@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from forest._jit import driver, njit
 from forest._threads import in_threads
-from forest.surface.blend.cones import Limbs
 from forest.surface.blend.field import cone
+from forest.surface.blend.limbs import Limbs
 
 _Floats = NDArray[np.float64]
 _CHUNKS = 64

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from forest.errors import InputError, nearest
 from forest.surface.blend.cells import CELLS_IN_RADIUS, SLOPE, cells_near, check_memory, lattice_of
-from forest.surface.blend.cones import Reaction, limbs_of, sound
+from forest.surface.blend.cones import sound
 from forest.surface.blend.crossings import crossings
 from forest.surface.blend.field import Blend
 from forest.surface.blend.foot import Flare, usual_flare
+from forest.surface.blend.limbs import Reaction, limbs_of
 from forest.surface.blend.odd import refuse_buried, tell_gaps
 from forest.surface.blend.polygonise import march
 from forest.surface.blend.twigs import Twigs, twigs_of

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
+from forest.surface.blend.limbs import limbs_of
 from forest.surface.export import Material, Part, linear
 from forest.surface.flow.cover import Near, cover
 from forest.surface.flow.flowing import FlowRules, flow

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forest.errors import InputError
-from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
+from forest.surface.blend.limbs import limbs_of
 from forest.surface.flow.cover import Cover, Near, around_limbs, cover, settle_cover
 from forest.surface.flow.pruning import Wound
 from forest.trees.skeleton import Skeleton

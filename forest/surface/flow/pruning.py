@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest.errors import InputError
-from forest.surface.blend.cones import limbs_of
 from forest.surface.blend.field import Blend
+from forest.surface.blend.limbs import limbs_of
 from forest.trees.skeleton import Skeleton
 
 _Floats = NDArray[np.float64]
