@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from forest._jit import njit
 from forest.surface.blend.limbs import Limbs
 from forest.surface.blend.field import cone, joint, smooth_least, value
-from forest.surface.blend.tree_of_boxes import PER_LEAF, distance_to_box, past
+from forest.surface.blend.tree_of_boxes import visit
 
 #: Most cones, and most joints, that a list holds; where more are near, the whole surface is seen.
 ROOM = 32
@@ -131,16 +131,9 @@ def _gather_cones(
     """
     count = 0
     node = np.int64(1)
-    leaves = field.boxes.leaves[0]
     while node > 0:
-        if distance_to_box(field.boxes, node, x, y, z) > reach:
-            node = past(node)
-            continue
-        if node < leaves:
-            node *= 2
-            continue
-        first = (node - leaves) * PER_LEAF
-        for k in range(first, min(first + PER_LEAF, len(field.boxes.item))):
+        first, last, node = visit(field.boxes, node, x, y, z, reach)
+        for k in range(first, last):
             i = field.boxes.item[k]
             near = _at_least(field.cones, i, x, y, z) <= reach
             if near and _sees(kin, axis, field.cones.axis[i]):
@@ -148,7 +141,6 @@ def _gather_cones(
                     return -1
                 row[count] = i
                 count += 1
-        node = past(node)
     return count
 
 
@@ -164,16 +156,9 @@ def _gather_joints(
     joints = field.joints
     axes = field.cones.axis
     node = np.int64(1)
-    leaves = field.places.leaves[0]
     while node > 0:
-        if distance_to_box(field.places, node, x, y, z) > reach:
-            node = past(node)
-            continue
-        if node < leaves:
-            node *= 2
-            continue
-        first = (node - leaves) * PER_LEAF
-        for k in range(first, min(first + PER_LEAF, len(field.places.item))):
+        first, last, node = visit(field.places, node, x, y, z, reach)
+        for k in range(first, last):
             place = field.places.item[k]
             fresh = 1
             for j in range(joints.place[place], joints.place[place + 1]):
@@ -187,7 +172,6 @@ def _gather_joints(
                 row[count] = 2 * j + fresh
                 fresh = 0
                 count += 1
-        node = past(node)
     return count
 
 
