@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
-from forest.surface.blend.limbs import Limbs
 from forest.surface.blend.field import cone, joint, smooth_least, value
+from forest.surface.blend.limbs import Limbs
 from forest.surface.blend.tree_of_boxes import visit
 
 #: Most cones, and most joints, that a list holds; where more are near, the whole surface is seen.
