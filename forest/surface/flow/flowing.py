@@ -18,11 +18,9 @@ from forest.surface.flow.chain import (
     Chain,
     Forces,
     advance,
-    empty_chain,
-    grain_heading,
-    put,
     with_room,
 )
+from forest.surface.flow.laying import Rings, start
 from forest.surface.flow.surface import Limbed, limbed
 from forest.surface.flow.trails import Trails
 
@@ -38,8 +36,6 @@ _STUCK = 0.02
 _PATIENCE, _EFFORT = 8.0, 3.0
 #: Points of trails so far within the wood, in radii of the limb, lie where limbs cross.
 _WITHIN = 0.01
-#: Height of the ring at the start above the ground, units.
-_START = 0.1
 
 
 @dataclass(frozen=True)
@@ -182,6 +178,8 @@ class Flow:
         Length of one unit of the paper, m.
     relinked : int
         How often the chain was relinked.
+    laid : int
+        Rings laid anew on limbs past places where the chain hung, and on those it had not reached.
     stuck : int
         Particles that did not come to a tip.
     chains : list of Loops
@@ -191,59 +189,9 @@ class Flow:
     trails: Trails
     unit_m: float
     relinked: int
+    laid: int
     stuck: int
     chains: list[Loops]
-
-
-def _start(surface: Limbed, rules: FlowRules, unit: float) -> Chain:
-    """Lay a ring of particles around the foot of each stem."""
-    cones = surface.field.cones
-    feet = np.flatnonzero(np.isfinite(cones.ground[cones.axis]) & (cones.along == 0.0))
-    feet = feet if len(feet) else np.zeros(1, np.int64)
-    radius = cones.low[feet] + cones.flare[cones.axis[feet], 1]
-    mean = 0.5 * (rules.greatest_link + rules.least_link) * unit
-    sizes = [max(6, math.ceil(2.0 * math.pi * r / mean)) for r in radius]
-    chain = empty_chain(16 * sum(sizes))
-    first = 0
-    for foot, r, n in zip(feet.tolist(), radius.tolist(), sizes, strict=True):
-        _lay_ring(surface, chain, rules, unit, foot, r, first, n)
-        first += n
-    chain.tally[:2] = first
-    return chain
-
-
-def _lay_ring(
-    surface: Limbed,
-    chain: Chain,
-    rules: FlowRules,
-    unit: float,
-    foot: int,
-    radius: float,
-    first: int,
-    n: int,
-) -> None:
-    """Put particles `first` to `first + n` around the lower end of a cone, linked in a ring."""
-    cones = surface.field.cones
-    line = cones.end[foot] - cones.start[foot]
-    line /= np.linalg.norm(line)
-    side = np.cross(line, np.eye(3)[int(np.argmin(np.abs(line)))])
-    side /= np.linalg.norm(side)
-    other = np.cross(line, side)
-    base = cones.start[foot] + _START * unit * line
-    lean = math.radians(rules.spiral_deg)
-    for k in range(n):
-        i = first + k
-        turn = 2.0 * math.pi * k / n
-        x, y, z = base + radius * (math.cos(turn) * side + math.sin(turn) * other)
-        chain.cone[i] = foot
-        chain.limb[i] = cones.axis[foot]
-        chain.state[i] = FLOWING
-        put(surface, chain, rules.forces(unit), np.int64(i), float(x), float(y), float(z))
-        way = grain_heading(chain.normal[i], line, math.cos(lean), math.sin(lean))
-        chain.velocity[i] = rules.speed * unit * np.array(way)
-        chain.ahead[i], chain.behind[i] = first + (k + 1) % n, first + (k - 1) % n
-        chain.live[i] = i
-        chain.mother[i] = -1
 
 
 def _loops(chain: Chain, time_s: float) -> Loops:
@@ -321,9 +269,10 @@ def flow(
         if value is not None and not 0.0 < value < math.inf:
             raise InputError(f"{value:g}", where=name, expected="a finite number above 0")
     forces = rules.forces(unit)
-    chain = _start(surface, rules, unit)
+    chain = start(surface, forces)
     far = float(np.linalg.norm(cones.end - cones.start[0], axis=1).max())
     longest = _PATIENCE * far / (rules.speed * unit) if seconds is None else seconds
+    rings = Rings(surface, chain, forces) if rules.steering > 0.0 else None
     trails = _Recorder()
     shown = [_loops(chain, 0.0)]
     trails.take(chain, 0.0)
@@ -339,6 +288,9 @@ def flow(
             continue
         time_s = done * forces.step
         trails.take(chain, time_s)
+        if rings is not None:
+            chain = rings.tend(chain, done, flowing)
+            flowing = flowing or rings.fresh
         if time_s >= next_show or not flowing:
             shown.append(_loops(chain, time_s))
             next_show += show_every_s
@@ -349,6 +301,7 @@ def flow(
         trails=trails.trails(chain, blend),
         unit_m=unit,
         relinked=int(chain.tally[2]),
+        laid=rings.laid if rings is not None else 0,
         stuck=int(np.count_nonzero(chain.state[live] != DONE)),
         chains=shown,
     )
