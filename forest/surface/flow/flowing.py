@@ -344,13 +344,15 @@ class _Recorder:
     def trails(self, chain: Chain, blend: Blend) -> Trails:
         number = np.concatenate(self._number)
         time = np.repeat(self._time, [len(part) for part in self._number])
-        inside = blend.value(np.concatenate(self._place)) / np.concatenate(self._radius) < -_WITHIN
         order = np.argsort(number, kind="stable")  # by particle, then by time
-        order = order[~inside[order]]
+        place = np.concatenate(self._place)[order]
+        radius = np.concatenate(self._radius)[order]
+        outside = blend.value(place) >= -_WITHIN * radius
+        place, order = place[outside], order[outside]
         number = number[order]
         names, first = np.unique(number, return_index=True)
         return Trails(
-            place=np.concatenate(self._place)[order],
+            place=place,
             time_s=time[order],
             limb=np.concatenate(self._limb)[order],
             off_m=np.concatenate(self._off)[order],

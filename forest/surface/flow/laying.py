@@ -48,7 +48,7 @@ class Watch(NamedTuple):
     rest: _Floats  # (n, 3) place that a particle has been near
     since: NDArray[np.int64]  # (n,) step at which it came there
     walked: NDArray[np.int64]  # (n,) scratch: step at which it was walked over
-    front: _Floats  # (axes,) farthest from its base that a ring has been, m; below 0: none
+    front: _Floats  # (axes,) farthest from its base that a ring was or was tried, m; below 0: none
 
 
 def new_watch(surface: Limbed, chain: Chain) -> Watch:
@@ -238,11 +238,12 @@ def not_reached(surface: Limbed, watch: Watch) -> list[int]:
     kin = surface.kin
     axes = np.unique(surface.field.cones.axis)
     left = set(axes[watch.front[axes] < 0.0].tolist())
-    return [
-        axis
-        for axis in sorted(left)
-        if not any(k < axis and k in left for k in kin.other[kin.first[axis] : kin.first[axis + 1]])
-    ]
+    found = []
+    for axis in sorted(left):
+        joined = kin.other[kin.first[axis] : kin.first[axis + 1]]
+        if not any(k < axis and k in left for k in joined):
+            found.append(axis)
+    return found
 
 
 def waits(surface: Limbed, forces: Forces) -> tuple[np.int64, float]:
@@ -258,7 +259,6 @@ class Rings:
         self._surface, self._forces = surface, forces
         self._watch = new_watch(surface, chain)
         self._seen = int(chain.tally[0])
-        self._tried: set[int] = set()
         self.laid = 0
         self.fresh = False
 
@@ -270,17 +270,23 @@ class Rings:
         first, now = np.int64(self._seen), np.int64(step)
         hung = int(look(self._surface, chain, self._watch, first, now, wait, crept))
         self._seen = int(chain.tally[0])
-        places = {}
+        self.fresh = False
         if hung >= 0:
-            places = take_out_loop(self._surface, chain, self._watch, hung)
-        elif not flowing:
-            left = [k for k in not_reached(self._surface, self._watch) if k not in self._tried]
-            self._tried.update(left)
-            places = dict.fromkeys(left, 0.0)
-        before = self.laid
+            chain = self._lay(chain, take_out_loop(self._surface, chain, self._watch, hung))
+        while not flowing and not self.fresh:
+            axes = not_reached(self._surface, self._watch)
+            if not axes:
+                break
+            chain = self._lay(chain, dict.fromkeys(axes, 0.0))
+        return chain
+
+    def _lay(self, chain: Chain, places: dict[int, float]) -> Chain:
+        """Lay a ring on each limb beyond its place."""
         for axis, beyond in places.items():
             ever = int(chain.tally[0])
             chain = lay(self._surface, chain, self._forces, axis, beyond)
-            self.laid += int(chain.tally[0]) > ever
-        self.fresh = self.laid > before
+            if int(chain.tally[0]) > ever:
+                self.laid += 1
+                self.fresh = True
+            self._watch.front[axis] = max(self._watch.front[axis], beyond)
         return chain
