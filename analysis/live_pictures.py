@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from viewer_pictures import ROOT, shoot
+from viewer_pictures import ROOT, answered, shoot
 
 _PATIENCE_MS = 240_000
 _STAND = ROOT / "scenarios" / "mixed_stand.toml"
@@ -65,13 +65,14 @@ def _a_branch(page: Any, least: int, most: int) -> tuple[float, float]:
     for down in [0.2 + 0.015 * k for k in range(40)]:
         for across in (0.42, 0.45, 0.48, 0.52, 0.55, 0.58, 0.62):
             page.mouse.click(*_place(page, across, down))
-            page.wait_for_timeout(200)
+            answered(page)
+            page.wait_for_timeout(100)
             if page.locator("#prune-lit").count():
                 found = re.findall(r": (\d+) metamers", page.inner_text("#prune-lit"))
                 if least <= int(found[0]) <= most:
                     return across, down
                 page.mouse.click(*_place(page, 0.03, 0.15))
-                page.wait_for_timeout(150)
+                answered(page)
     sys.exit("no branch was met")
 
 
@@ -130,6 +131,9 @@ def work_in_a_stand(page: Any) -> None:
     """Thin by rule, fell and mark."""
     _grow(page, 20)
     page.click("button[title='Fell']")
+    page.wait_for_timeout(1500)
+    page.click("#fell-to", force=True)
+    page.click(".v-list-item:has-text('leave N')")
     page.wait_for_timeout(1500)
     page.fill("#fell-value", "1800")
     page.keyboard.press("Tab")

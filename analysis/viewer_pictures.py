@@ -19,6 +19,11 @@ GALLERY = ROOT / "docs" / "gallery"
 _PATIENCE_MS = 240_000
 
 
+def answered(page: Any) -> None:
+    """Wait until the viewer has done what the page has sent."""
+    page.evaluate("window.trame.trigger('key', [''])")  # a key of no meaning, answered in turn
+
+
 def shoot(page: Any, name: str, *, still: bool = False) -> None:
     """Save the page as a picture of the gallery, in few colours; `still` leaves the pointer."""
     from io import BytesIO
@@ -27,7 +32,9 @@ def shoot(page: Any, name: str, *, still: bool = False) -> None:
 
     if not still:
         page.mouse.move(4, 4)
-    page.wait_for_timeout(4000)
+    for wait_ms in (500, 3500):  # what is drawn soon, and its picture
+        answered(page)
+        page.wait_for_timeout(wait_ms)
     image = Image.open(BytesIO(page.screenshot())).convert("RGB")
     image.quantize(256, kmeans=1, dither=Image.Dither.NONE).save(
         GALLERY / f"{name}.png", optimize=True

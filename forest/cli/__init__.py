@@ -22,7 +22,7 @@ from forest.cli.planting import tree
 from forest.cli.reading import info, landscape, picture, stability, table
 from forest.cli.ringing import rings
 from forest.cli.scenery import scene
-from forest.cli.shared import Stopped
+from forest.cli.shared import STOPPED, Stopped
 from forest.cli.showing import view
 from forest.cli.surfacing import mesh
 from forest.cli.viewing import stand_view
@@ -31,7 +31,6 @@ from forest.cli.viewing import stand_view
 _UsageError: Any = typer.BadParameter.__base__
 
 _REFUSED = 2
-_STOPPED = 130  # as shells report a process that SIGINT ended
 _UNHEARD = 1  # as typer and rich do
 
 app = typer.Typer(
@@ -104,7 +103,7 @@ def _answer(command: Callable[[], Any]) -> int:
         return _refuse(str(error))
     except (Stopped, KeyboardInterrupt, typer.Abort) as stop:
         typer.echo(f"forest: {str(stop) or 'stopped'}", err=True)
-        return _STOPPED
+        return STOPPED
     except BrokenPipeError:
         # The reader (head, less) has gone; nothing is left to say, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -174,6 +174,8 @@ def bark(
             cracks=() if shrink else chosen.cracks,
         )
     written = _write(grown, chosen.skeleton, choices)
+    for missed in grown.missed:
+        typer.echo(f"{chosen.name}: {missed}")
     rings, cracks = len(grown.bark.strips.axis), len(grown.bark.fractures.origin)
     typer.echo(
         f"{written}: {kept.name} bark of {chosen.name}, {len(grown.axes)} axes, "

@@ -24,6 +24,9 @@ Overrides = Annotated[
 #: Suffixes of what commands write.
 PICTURE, FRAME = (".png",), (".csv", ".parquet")
 
+#: The exit code of what was stopped, as shells report a process that SIGINT ended.
+STOPPED = 130
+
 
 class Stopped(Exception):
     """A run was stopped; typer would not let KeyboardInterrupt keep its message."""

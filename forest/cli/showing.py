@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from forest.cli.shared import STOPPED
+
+if TYPE_CHECKING:
+    from forest.viewer.app import App
 
 
 def view(
@@ -42,7 +48,7 @@ def view(
     A scenario is grown live: run, pause, step; fell, prune, bend, plant, draw with the brush.
     All that is done is kept in the session's file, a scenario that replays it to the same bits.
 
-    The page is served on this machine and to this machine alone. Ctrl-C ends it.
+    The page is served on this machine and to its user alone. Ctrl-C ends it.
 
     Examples:
 
@@ -70,11 +76,19 @@ def view(
 def _view_run(file: Path, host: str, port: int, browser: bool) -> None:
     from forest.record.run import open_run
     from forest.viewer.app import App
+    from forest.viewer.server import serve
     from forest.viewer.source import RunSource
 
     with open_run(file) as run:
         app = App(RunSource(run))
-        _serve(app, host, port, _ready(file.name, browser))
+        serve(
+            app.server,
+            host=host,
+            port=port,
+            ready=_ready(file.name, browser),
+            stopping=lambda: _say_what_ends(app),
+            at_once=lambda: _stop_at_once(""),
+        )
 
 
 def _view_live(file: Path, session_file: Path, host: str, port: int, browser: bool) -> None:
@@ -84,6 +98,7 @@ def _view_live(file: Path, session_file: Path, host: str, port: int, browser: bo
     from forest.viewer.app import App
     from forest.viewer.live import LivePart
     from forest.viewer.live_source import LiveSource
+    from forest.viewer.server import serve
 
     if session_file.resolve() == file.resolve():
         raise InputError(
@@ -91,21 +106,28 @@ def _view_live(file: Path, session_file: Path, host: str, port: int, browser: bo
         )
     scenario = Scenario.load(file)
     session = take_up(scenario, session_file, say=lambda line: typer.echo(line, err=True))
-    part = LivePart()
-    app = App(LiveSource(session, str(session_file)), panels=(part.panel,))
+    part, source = LivePart(), LiveSource(session, str(session_file))
+    app = App(source, panels=(part.panel,))
     done = f", {years_of(len(session.records))} grown" if session.records else ""
     replay = shlex.join(["forest", "run", str(session_file), "--out", f"{session_file.stem}.h5"])
+
+    def stop_at_once() -> None:
+        within = f" within {app.state.live_next}, which is lost" if source.growing else ""
+        source.close()
+        _stop_at_once(f"{within}; all before it is kept in {session_file}")
+
     try:
-        _serve(app, host, port, _ready(f"{file.name}{done}", browser))
+        serve(
+            app.server,
+            host=host,
+            port=port,
+            ready=_ready(f"{file.name}{done}", browser),
+            stopping=lambda: _say_what_ends(app),
+            at_once=stop_at_once,
+        )
     finally:
         part.desk.finish()
     typer.echo(f"the session is kept in {session_file}; it is grown again by: {replay}")
-
-
-def _serve(app: Any, host: str, port: int, ready: Callable[[str], None]) -> None:
-    from forest.viewer.server import serve
-
-    serve(app.server, host=host, port=port, ready=ready)
 
 
 def _ready(what: str, browser: bool) -> Callable[[str], None]:
@@ -117,3 +139,20 @@ def _ready(what: str, browser: bool) -> Callable[[str], None]:
             webbrowser.open(address)
 
     return ready
+
+
+def _say_what_ends(app: App) -> None:
+    """Say for what the program waits before it ends."""
+    if app.state.live_growing:
+        what = f"year {app.state.live_next}"
+    elif app.state.shape_busy or app.state.light_busy:
+        what = "what is being made"
+    else:
+        return
+    typer.echo(f"forest view: finishing {what}; again to stop at once", err=True)
+
+
+def _stop_at_once(where: str) -> None:
+    """End the program, whatever its threads do: they cannot be ended otherwise."""
+    typer.echo(f"forest view: stopped{where}", err=True)
+    os._exit(STOPPED)

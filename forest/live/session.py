@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,8 +139,7 @@ class LiveSession:
             plan_year(self.stand, self.next_year)
         except InputError as error:
             self._become(before)
-            number = len(self._base.acts) + len(self._acts) + len(self._pending)
-            raise InputError(str(error).replace(f"acts[{number}]", "act", 1)) from None
+            raise _of_act(error, self._next_number) from None
         self._wait(queued, before)
 
     def undo(self, number: int = -1) -> None:
@@ -228,13 +228,29 @@ class LiveSession:
         InputError
             If it cannot be bent so.
         """
-        keys = {"kind": "bend", "tree_id": tree_id, "metamer": metamer, "to_m": list(to_m)}
-        before = self.stand.scenario
+        with self._as_if(kind="bend", tree_id=tree_id, metamer=metamer, to_m=list(to_m)) as plan:
+            return preview(self.stand, tree_id, plan)
+
+    def would_fell(self, **keys: Any) -> tuple[int, ...]:
+        """Trees that an act would fell beside those that wait to be felled; nothing is queued.
+
+        Parameters
+        ----------
+        **keys
+            As of `act`.
+
+        Raises
+        ------
+        InputError
+            If it cannot be done.
+        """
+        number = self._next_number
         try:
-            self._become(self._with([*self._pending, keys]))
-            return preview(self.stand, tree_id, plan_year(self.stand, self.next_year))
-        finally:
-            self._become(before)
+            with self._as_if(**keys) as plan:
+                felling = None if plan is None else plan.fellings.get(number)
+                return () if felling is None else tuple(felling.tree_ids)
+        except InputError as error:
+            raise _of_act(error, number) from None
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -311,6 +327,21 @@ class LiveSession:
             self._planned = True
         return self._plan_now
 
+    @contextmanager
+    def _as_if(self, **keys: Any) -> Iterator[YearOfActs | None]:
+        """Give the plan of the next step as if one more act waited."""
+        before = self.stand.scenario
+        try:
+            self._become(self._with([*self._pending, keys]))
+            yield plan_year(self.stand, self.next_year)
+        finally:
+            self._become(before)
+
+    @property
+    def _next_number(self) -> int:
+        """The place among the scenario's acts of one that is queued now."""
+        return len(self._base.acts) + len(self._acts) + len(self._pending)
+
     def _dated(self, acts: list[dict[str, Any]]) -> list[dict[str, Any]]:
         return [{**keys, "year": self.next_year} for keys in acts]
 
@@ -334,3 +365,8 @@ class LiveSession:
             self._pending = were
             self._become(before)
             raise
+
+
+def _of_act(error: InputError, number: int) -> InputError:
+    """Say of an act, not of its place among all acts, what is wrong."""
+    return InputError(str(error).replace(f"acts[{number}]", "act", 1))

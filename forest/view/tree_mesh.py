@@ -100,7 +100,7 @@ def write_samples(
         wood = _blended_or_tubes(skeleton, say) if surface == "blended" else tubes(skeleton)
         parts = tree_parts(wood, skeleton, leaves)
         if bark and skeleton.radius.max() >= LEAST_RADIUS_M:
-            parts[:1] = barked_parts(run, skeleton, year, wood)
+            parts[:1] = barked_parts(run, skeleton, year, wood, say=say)
         written.append(write_mesh(parts, to, overwrite=True))
     return written
 
@@ -122,15 +122,19 @@ def barked_parts(
     *,
     least_radius_m: float = LEAST_RADIUS_M,
     waiting: Sequence[Crack] = (),
+    say: Callable[[str], None] = lambda line: None,
 ) -> list[Part]:
     """Put the usual bark of a sample tree's species on its wood, torn as the tree grew.
 
-    Its cracks are those of the run's acts up to the year, and any that wait for the next.
+    Its cracks are those of the run's acts up to the year, and any that wait for the next; `say`
+    is told of each that is not to be seen in a line.
     """
     preset = Preset.load(usual_preset(skeleton.species))
     rings = yearly_wood(run, skeleton, year)
     cracks = (*recorded_cracks(run, skeleton.tree_id, year), *waiting)
     grown = bark_tree(skeleton, preset, 1, wood=rings, least_radius_m=least_radius_m, cracks=cracks)
+    for missed in grown.missed:
+        say(f"tree {skeleton.tree_id}: {missed}")
     return dressed_parts(grown, wood)
 
 

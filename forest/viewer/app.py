@@ -15,7 +15,9 @@ from forest.errors import InputError
 from forest.view.stand_years import conifers_of
 from forest.viewer.colours import CHOICES, colour_trees, colours_of_others, legend_of_others
 from forest.viewer.detail import trees_in_detail
+from forest.viewer.fields import choices
 from forest.viewer.picking import Hit
+from forest.viewer.picture import Picture
 from forest.viewer.server import import_trame
 from forest.viewer.source import Source
 from forest.viewer.stage import GRID_M, Stage
@@ -76,6 +78,7 @@ class App:
         self.state = self.server.state
         self.source = source
         self.stage = Stage(source.scenario.plot.size_m, conifers_of(source.scenario))
+        self._picture = Picture(self)
         self.tools: dict[str, Tool] = {}
         self._pressed: tuple[float, float, Hit] | None = None
         self._wanted: dict[str, Callable[[], None]] = {}
@@ -102,9 +105,7 @@ class App:
                 "playing": False,
                 "speed": 2,
                 "colour_by": "species",
-                "colour_choices": [
-                    {"title": label, "value": name} for name, label in CHOICES.items()
-                ],
+                "colour_choices": choices(CHOICES),
                 "legend": {},
                 "grid": f"grid {GRID_M:g} m"
                 if max(self.source.scenario.plot.size_m) > GRID_M
@@ -220,6 +221,11 @@ class App:
         if self.server.running:
             self.server.controller.view_update()
 
+    @property
+    def dragging(self) -> bool:
+        """Whether a tool is dragged, and pictures follow it."""
+        return self._pressed is not None and self._tool.drags
+
     def warn(self, message: str) -> None:
         """Tell the user in a line why something was not done."""
         self.state.message = message
@@ -319,8 +325,9 @@ class App:
     ) -> None:
         """Take a press, move or release of the pointer, at pixels of a view of this size."""
         tool = self._tool
+        place = self._picture.place(across, down, width, height)
         if kind == "down":
-            hit = self.stage.hit(across / width, down / height, pressure)
+            hit = self.stage.hit(*place, pressure)
             self._pressed = (across, down, hit)
             if tool.drags:
                 self.tried(lambda: tool.drag(hit, hit, done=False))
@@ -334,5 +341,7 @@ class App:
         if kind == "up" and still:
             self.tried(lambda: tool.click(start))
         elif tool.drags:
-            now = self.stage.hit(across / width, down / height, pressure)
+            now = self.stage.hit(*place, pressure)
             self.tried(lambda: tool.drag(start, now, done=kind == "up"))
+            if kind == "up":
+                self.push()  # smooth again

@@ -12,14 +12,20 @@ from forest.view.working_plane import WorkingPlane
 from forest.viewer.branch_tools import BranchTool
 from forest.viewer.desk import Desk
 from forest.viewer.drawing import draw_brush
+from forest.viewer.fields import as_number, choice_field, choices, number_field, switch
 from forest.viewer.picking import Hit
-from forest.viewer.tool_options import as_number, choice_field, number_field
 
 _COLOUR = "#b3471d"
 _WHEEL = 1.12  # by how much a notch of the wheel changes the radius
 _LEAST_M, _MOST_M = 0.02, 50.0
 _STEP = 0.3  # of the radius, between two points of the path
 _NO_PEN = 0.5  # what browsers say of a mouse's button
+_SYMMETRIES = {
+    "none": "None",
+    "mirror": "Mirror",
+    "rotation": "All round",
+    "tiling": "In a row",
+}
 
 
 class BrushTool(BranchTool):
@@ -176,23 +182,10 @@ class BrushTool(BranchTool):
         number_field(v, "brush_radius", "Radius, m", min=_LEAST_M, step=0.05)
         number_field(v, "brush_spacing", "Between markers, m", min=0.005, step=0.01)
         number_field(v, "brush_steps", "Years in which it moves", min=1)
-        v.VSwitch(
-            v_model=("brush_alone",),
-            label="Only the bud where it begins grows",
-            density="compact",
-            hide_details=True,
-            color="primary",
-            id="brush-alone",
-        )
+        switch(v, "brush_alone", "Only the bud where it begins grows")
         with html.Div(v_if=("brush_alone",)):
             number_field(v, "brush_hold", "and so many years longer", min=0)
-        kinds = [
-            {"title": "None", "value": "none"},
-            {"title": "Mirror", "value": "mirror"},
-            {"title": "All round", "value": "rotation"},
-            {"title": "In a row", "value": "tiling"},
-        ]
-        choice_field(v, "brush_symmetry", "Symmetry", ("brush_symmetries", kinds))
+        choice_field(v, "brush_symmetry", "Symmetry", ("brush_symmetries", choices(_SYMMETRIES)))
         with html.Div(v_if=("brush_symmetry === 'mirror'",)):
             number_field(v, "brush_azimuth", "Across the mirror, ° from x", step=15)
         with html.Div(v_if=("brush_symmetry === 'rotation'",)):

@@ -12,6 +12,7 @@ import numpy as np
 from forest.errors import InputError
 from forest.viewer.charts import line_chart
 from forest.viewer.colours import fates, species_label
+from forest.viewer.fields import number_field, switch, text_field
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +47,7 @@ class TreeCard:
         app.state.update(
             {
                 "card_html": "",
-                "find_id": "",
+                "find": "",
                 "disc_height": 1.3,
                 "disc_image": "",
                 "disc_said": "",
@@ -61,45 +62,21 @@ class TreeCard:
         from trame.widgets import vuetify3 as v
 
         with html.Div(classes="d-flex align-center mb-3"):
-            v.VTextField(
-                v_model=("find_id",),
-                label="Find a tree by its number",
-                density="compact",
-                variant="outlined",
-                hide_details=True,
-                id="find",
-                raw_attrs=["@keydown.enter=\"trigger('find', [find_id])\""],
-            )
-            v.VBtn("Find", variant="text", click="trigger('find', [find_id])", id="find-button")
+            go = "trigger('find', [find])"
+            text_field(v, "find", "Find a tree by its number", enter=go)
+            v.VBtn("Find", variant="text", click=go, id="find-button")
         html.Div(
             "Click a tree in the view or on the map.", v_if=("chosen === null",), classes="quiet"
         )
         with html.Div(v_if=("chosen !== null",)):
-            v.VSwitch(
-                v_model=("alone",),
-                label="Show this tree alone",
-                density="compact",
-                hide_details=True,
-                color="primary",
-                id="alone",
-            )
+            switch(v, "alone", "Show this tree alone")
             self._app.surfaces.build()
             html.Div(v_html=("card_html",), id="card")
             html.H3("Disc")
             with html.Div(classes="d-flex align-center"):
-                v.VTextField(
-                    v_model_number=("disc_height",),
-                    label="Height above the ground, m",
-                    type="number",
-                    step=0.1,
-                    min=0,
-                    density="compact",
-                    variant="outlined",
-                    hide_details=True,
-                    id="disc-height",
-                    raw_attrs=["@keydown.enter=\"trigger('disc')\""],
-                )
-                v.VBtn("Cut", variant="text", click="trigger('disc')", id="cut")
+                go, label = "trigger('disc')", "Height above the ground, m"
+                number_field(v, "disc_height", label, enter=go, step=0.1, min=0, classes="")
+                v.VBtn("Cut", variant="text", click=go, id="cut")
             html.Div("{{ disc_said }}", classes="quiet mt-1")
             html.Img(
                 v_if=("disc_image",),

@@ -124,8 +124,10 @@ class Desk:
 
     def _ended(self, grower: asyncio.Task[None]) -> None:
         """Say what went wrong, if something did that is no user's error."""
+        if grower.cancelled():  # the program ends, when the thread does
+            return
         self.source.growing = False
-        if not grower.cancelled() and grower.exception() is not None:
+        if grower.exception() is not None:
             self.app.fault(repr(grower.exception()))
 
     async def _grow(self) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from forest.errors import InputError
 from forest.view.scene import import_pyvista
+from forest.viewer.fields import choice_field, choices, number_field
 from forest.viewer.inside import (
     LIGHT_COLOURS,
     LightView,
@@ -57,9 +58,7 @@ class LightPanel:
                 "light_image": "",
                 "light_pixels": "",
                 "light_by": "tree",
-                "light_colours": [
-                    {"title": label, "value": name} for name, label in LIGHT_COLOURS.items()
-                ],
+                "light_colours": choices(LIGHT_COLOURS),
                 "light_busy": False,
                 "light_shown": "",
                 "light_top": "",
@@ -79,18 +78,7 @@ class LightPanel:
         html.Div("{{ light_why_not }}", v_if=("light_why_not",), classes="quiet", id="light-why")
         with html.Div(v_if=("!light_why_not",)):
             html.Div("Of the stand as it stood in {{ light_year }}.", classes="quiet mb-2")
-            v.VTextField(
-                v_model_number=("light_height",),
-                label="Height above the ground, m",
-                type="number",
-                min=0,
-                step=0.5,
-                density="compact",
-                variant="outlined",
-                hide_details=True,
-                classes="mb-2",
-                id="light-height",
-            )
+            number_field(v, "light_height", "Height above the ground, m", min=0, step=0.5)
             for name, label, icon in _WAYS:
                 v.VBtn(
                     label,
@@ -119,16 +107,7 @@ class LightPanel:
                     html.Span("0")
                     html.Span("{{ light_top }}")
             with html.Div(v_if=("light_image",)):
-                v.VSelect(
-                    v_model=("light_by",),
-                    items=("light_colours",),
-                    label="Colour leaves by",
-                    density="compact",
-                    variant="outlined",
-                    hide_details=True,
-                    classes="mt-2",
-                    id="light-by",
-                )
+                choice_field(v, "light_by", "Colour leaves by", ("light_colours",), classes="mt-2")
                 html.Div("{{ light_pixels }}", classes="quiet mt-2", id="light-pixels")
                 html.Img(
                     src=("light_image",),

@@ -8,7 +8,8 @@ from forest.viewer.bark_tool import CrackTool
 from forest.viewer.branch_tools import BendTool, PruneTool
 from forest.viewer.brush_tool import BrushTool
 from forest.viewer.desk import Desk
-from forest.viewer.live_tools import FellTool, LiveTool, MarkTool, PlantTool
+from forest.viewer.fell_tool import FellTool
+from forest.viewer.live_tools import LiveTool, MarkTool, PlantTool
 from forest.viewer.obstacle_tool import ObstacleTool
 from forest.viewer.work_panel import WorkPanel
 

@@ -23,7 +23,7 @@ from forest.view.standing import (
 from forest.viewer.source import COLUMNS, largest_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     import pandas as pd
     from numpy.typing import NDArray
@@ -123,7 +123,7 @@ class LiveSource:
     def _trees_at_first(self) -> pd.DataFrame:
         """The stand before its first year, with what is not known then."""
         trees = self.session.stand.trees
-        trees["status"] = "alive"
+        trees["status"] = "living"
         for name in COLUMNS:
             if name not in trees:
                 trees[name] = np.nan
@@ -194,6 +194,11 @@ class LiveSource:
 
     # ------------------------------------------------------------------ what needs the stand
 
+    def close(self) -> None:
+        """Remove what was written for the viewer alone."""
+        if self._recorded is not None:
+            self._recorded.cleanup()
+
     @contextmanager
     def at_rest(self) -> Iterator[LiveSession]:
         """Give the session if no year grows.
@@ -215,18 +220,24 @@ class LiveSource:
 
     @contextmanager
     def _run(self) -> Iterator[Run]:
-        """Give the session as a run file, written anew after each year."""
+        """Give the session as a run file, written anew after each year.
+
+        A year may grow as it is read.
+        """
         from forest.record.run import open_run
 
         with self.at_rest() as session:
-            if self._recorded is None:
+            folder = self._recorded
+            if folder is None:
                 folder = tempfile.TemporaryDirectory(prefix="forest-view-")
                 session.write_run(Path(folder.name) / "run.h5")
                 self._recorded = folder
-            with open_run(Path(self._recorded.name) / "run.h5") as run:
-                yield run
+        with open_run(Path(folder.name) / "run.h5") as run:
+            yield run
 
-    def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
+    def surface(
+        self, tree_id: int, year: int, shape: str, say: Callable[[str], None] = lambda line: None
+    ) -> list[Part]:
         """Surface of a living tree; only a sample tree has the rings along which bark is torn.
 
         Bark is that of the last year, with the cracks that wait.
@@ -246,7 +257,7 @@ class LiveSource:
                         f"tree {tree_id} is no sample tree: no rings to tear its bark along",
                         expected="one of output.sample_trees",
                     )
-                return surface_parts(run, tree_id, year, shape, waiting)
+                return surface_parts(run, tree_id, year, shape, waiting, say)
         species = {kind.name: kind for kind in self.scenario.species_list}
         skeleton = self.skeleton(tree_id, year)
         return wood_parts(skeleton, species[skeleton.species], shape)

@@ -82,7 +82,8 @@ class StandPanel:
             title = "Shares of basal area, %"
             parts.append(f"<h3>{title}</h3>{share_chart(years, shares, year, title)}")
             keys = (
-                f'<span class="swatch" style="background:{colour}"></span>{escape(name)}&ensp; '
+                '<span style="white-space: nowrap"><span class="swatch" '
+                f'style="background:{colour}"></span>{escape(name)}</span>&ensp; '
                 for name, (_, colour) in shares.items()
             )
             parts.append(f'<div class="quiet">{"".join(keys)}</div>')

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from forest.viewer.fields import choice_field
+
 if TYPE_CHECKING:
     from forest.viewer.app import App
 
@@ -37,6 +39,7 @@ body { font-family: Roboto, "Helvetica Neue", Arial, sans-serif; color: #2f3a33;
 .ends { display: flex; justify-content: space-between; width: 200px; }
 .hint { position: absolute; left: 14px; top: 10px; font-size: 12.5px; color: #4a564e;
   background: rgba(255,255,255,.75); border-radius: 6px; padding: 3px 9px; pointer-events: none; }
+#picture img { object-fit: contain; }
 .draws { cursor: crosshair; touch-action: none; }
 .year { font-size: 22px; font-weight: 500; min-width: 64px; text-align: center;
   font-variant-numeric: tabular-nums; }
@@ -124,16 +127,13 @@ def _bar(v: Any, html: Any) -> None:
                 size="small",
                 min_width=30,
             )
-        v.VSelect(
-            v_model=("colour_by",),
-            items=("colour_choices",),
-            label="Colour by",
-            density="compact",
-            variant="outlined",
-            hide_details=True,
+        choice_field(
+            v,
+            "colour_by",
+            "Colour by",
+            ("colour_choices",),
             style="max-width: 200px; min-width: 130px;",
             classes="mr-3 mt-1",
-            id="colour-by",
         )
         # A button that is off shows no title of its own; what is around it does.
         no_branches = "No tree has its branches on record in this year"
@@ -174,6 +174,8 @@ def _view(app: App, html: Any) -> None:
             f'@pointermove.capture="tool_drags && ($event.buttons & 1) && !$event.altKey '
             f'&& ($event.stopPropagation(), {_pointer("move")})"',
             f'@pointerup.capture="{_OURS} && {_pointer("up")}"',
+            "@pointerenter=\"trigger('entered', "
+            '[$event.currentTarget.clientWidth, $event.currentTarget.clientHeight])"',
             '@wheel.capture="tool_wheels && ($event.preventDefault(), $event.stopPropagation(), '
             "trigger('wheel', [$event.deltaY]))\"",
             ":class=\"tool_drags ? 'draws' : ''\"",
@@ -241,13 +243,5 @@ def _years(v: Any, html: Any) -> None:
         html.Div(
             "{{ years[0] }} – {{ years[years.length - 1] }}", classes="quiet mx-3 text-caption"
         )
-        v.VSelect(
-            v_model=("speed",),
-            items=("[1, 2, 5, 10]",),
-            label="Years/s",
-            density="compact",
-            variant="outlined",
-            hide_details=True,
-            style="max-width: 92px;",
-            classes="mt-1",
-        )
+        speeds = ("[1, 2, 5, 10]",)
+        choice_field(v, "speed", "Years/s", speeds, style="max-width: 92px;", classes="mt-1")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from forest.errors import InputError
-from forest.viewer.guard import LOOPBACK, guard
+from forest.viewer.guard import LOOPBACK, SOCKET, guard
 
 DEFAULT_PORT = 8765
 _PORTS_TRIED = 50
@@ -75,8 +75,10 @@ def serve(
     host: str,
     port: int,
     ready: Callable[[str], None],
+    stopping: Callable[[], None] = lambda: None,
+    at_once: Callable[[], None] = lambda: None,
 ) -> None:
-    """Answer browsers until SIGINT or SIGTERM.
+    """Answer browsers until SIGINT or SIGTERM, and then until what goes on in threads has ended.
 
     Parameters
     ----------
@@ -88,19 +90,35 @@ def serve(
         Free port.
     ready : callable
         Is given the page's address once it can be opened.
+    stopping : callable, optional
+        Called at the first signal, to say what must end first.
+    at_once : callable, optional
+        Called at any later signal.
     """
     os.environ["TRAME_ARGS"] = "--server"  # so that trame does not read this process's arguments
     name = f"[{host}]" if ":" in host else host
     trame_server.controller.on_server_bind.add(lambda server: _protect(server, port))
     trame_server.controller.on_server_ready.add(lambda **_: ready(f"http://{name}:{port}/"))
-    asyncio.run(_until_stopped(trame_server, host, port))
+    asyncio.run(_until_stopped(trame_server, host, port, stopping, at_once))
 
 
-async def _until_stopped(trame_server: Any, host: str, port: int) -> None:
+async def _until_stopped(
+    trame_server: Any,
+    host: str,
+    port: int,
+    stopping: Callable[[], None],
+    at_once: Callable[[], None],
+) -> None:
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
+
+    def asked() -> None:
+        told = stop.is_set()
+        stop.set()
+        (at_once if told else stopping)()
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
+        loop.add_signal_handler(number, asked)
     serving = asyncio.ensure_future(
         trame_server.start(
             port=port,
@@ -113,10 +131,10 @@ async def _until_stopped(trame_server: Any, host: str, port: int) -> None:
             exec_mode="coroutine",
         )
     )
-    stopping = asyncio.ensure_future(stop.wait())
-    await asyncio.wait((serving, stopping), return_when=asyncio.FIRST_COMPLETED)
+    stopped = asyncio.ensure_future(stop.wait())
+    await asyncio.wait((serving, stopped), return_when=asyncio.FIRST_COMPLETED)
     if serving.done():
-        stopping.cancel()
+        stopped.cancel()
         serving.result()  # raises what kept it from listening
         return
     with contextlib.suppress(Exception):
@@ -142,7 +160,7 @@ def _protect(server: Any, port: int) -> None:
         if request.path == "/" and request.method in ("GET", "HEAD"):
             return web.FileResponse(page, headers={"Cache-Control": "no-cache"})
         if request.path == "/paraview/" and request.method == "POST":
-            return web.json_response({"sessionURL": f"ws://{request.host}/ws"})
+            return web.json_response({"sessionURL": f"ws://{request.host}{SOCKET}"})
         return await handler(request)
 
     server.app.middlewares.extend([guard(lambda: port), web.middleware(root)])

@@ -13,6 +13,8 @@ from forest.view.stand_years import COLUMNS as BODY_COLUMNS
 from forest.view.stand_years import StandYears
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pandas as pd
 
     from forest.dendro.disc import Disc
@@ -109,10 +111,12 @@ class Source(Protocol):
     def disc(self, tree_id: int, height_m: float, year: int) -> Disc:
         """A disc out of a stem; InputError if there is none."""
 
-    def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
+    def surface(
+        self, tree_id: int, year: int, shape: str, say: Callable[[str], None] = lambda line: None
+    ) -> list[Part]:
         """Surface of a tree, "tubes", "blended" or with its "bark"; InputError if it has none.
 
-        Called in a thread of its own.
+        Called in a thread of its own. `say` is told in a line of what is not to be seen.
         """
 
     def waiting_for(self, tree_id: int) -> str:
@@ -207,11 +211,13 @@ class RunSource:
         """A disc, of a sample tree at any height, of others where `/rings` has one."""
         return self._run.disc(tree_id, height_m, year=year)
 
-    def surface(self, tree_id: int, year: int, shape: str) -> list[Part]:
+    def surface(
+        self, tree_id: int, year: int, shape: str, say: Callable[[str], None] = lambda line: None
+    ) -> list[Part]:
         """Surface of a sample tree."""
         from forest.viewer.surfaces import surface_parts
 
-        return surface_parts(self._run, tree_id, year, shape)
+        return surface_parts(self._run, tree_id, year, shape, say=say)
 
     def waiting_for(self, tree_id: int) -> str:
         """Nothing waits in a run."""

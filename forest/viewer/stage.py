@@ -30,6 +30,7 @@ _GROUND = (0.80, 0.78, 0.70)
 _GRID = (0.70, 0.68, 0.60)
 _CHOSEN = (0.98, 0.62, 0.10)
 _POINTER_RAD = 0.004
+_NOTCH = 1.15  # by how much a notch of the wheel brings the view nearer
 GRID_M = 10.0
 
 # Corners of stems, of crowns, rings of crowns: for so many trees at most.
@@ -64,9 +65,8 @@ class Stage:
         pv = import_pyvista()
         self.size_m = size_m
         self.plotter = pv.Plotter(off_screen=True, window_size=_WINDOW, lighting="none")
-        self.plotter.render_window.SetMultiSamples(0)
         self.plotter.set_background(_SKY[0], top=_SKY[1])
-        self.plotter.enable_terrain_style(mouse_wheel_zooms=True)
+        self.plotter.enable_terrain_style(mouse_wheel_zooms=False)
         for towards, strength in ((SUN, 0.85), (SUN * (-1.0, -1.0, 0.6), 0.4)):
             lamp = pv.Light(position=tuple(towards), intensity=strength, light_type="scene light")
             self.plotter.add_light(lamp)  # for what has no light baked into it
@@ -82,6 +82,10 @@ class Stage:
         self._top = 1.0
         self._looked: tuple[str, tuple[float, ...]] | None = None
         self.window.AddObserver("WindowResizeEvent", lambda *_: self._look_again())
+        for way, sign in (("Forward", 1.0), ("Backward", -1.0)):
+            self.plotter.iren.interactor.AddObserver(
+                f"MouseWheel{way}Event", lambda *_, sign=sign: self._zoom(sign)
+            )
         lay_ground(self.plotter, size_m, _GROUND, _GRID, grid_m=GRID_M)
 
     @property
@@ -194,7 +198,7 @@ class Stage:
         points = self._bodies.bodies.points[self._bodies.bodies.tree == rows[0]]
         foot = points[np.argmin(points[:, 2])]
         reach = np.linalg.norm(points[:, :2] - foot[:2], axis=1).max() * 1.08 + 0.15
-        ring = pv.Disc(center=(*foot[:2], 0.04), inner=0.86 * reach, outer=reach, c_res=48)
+        ring = pv.Disc(center=(*foot[:2], 0.04), inner=0.93 * reach, outer=reach, c_res=48)
         add_lit(self.plotter, ring, "chosen", color=_CHOSEN)
 
     def _add_branches(self, plotter: Any) -> None:
@@ -235,6 +239,23 @@ class Stage:
         released = [f"{button}ButtonReleaseEvent" for button in ("Left", "Middle", "Right")]
         for event in (*released, "MouseWheelForwardEvent", "MouseWheelBackwardEvent"):
             self.plotter.iren.interactor.AddObserver(event, lambda *_: tell())
+
+    def _zoom(self, notches: float) -> None:
+        """Come nearer to what is under the pointer, which stays there; or go away from it.
+
+        The style's factor says how far the wheel was turned: a touchpad sends parts of a notch.
+        """
+        interactor, camera = self.plotter.iren.interactor, self.plotter.camera
+        (x, y), (width, height) = interactor.GetEventPosition(), self.window.GetSize()
+        position, focus = np.array(camera.position), np.array(camera.focal_point)
+        towards = self.ray(x / width, 1.0 - y / height).direction
+        depth = (focus - position) @ self.looks
+        under = position + towards * depth / (towards @ self.looks)
+        turned = notches * interactor.GetInteractorStyle().GetMouseWheelMotionFactor()
+        left = _NOTCH**-turned
+        camera.position = tuple(under + left * (position - under))
+        camera.focal_point = tuple(under + left * (focus - under))
+        self.plotter.renderer.ResetCameraClippingRange()
 
     def look(self, way: str) -> None:
         """Point the camera at the whole stand from one of `LOOKS`."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ SHAPES = {
 }
 _MADE = ("tubes", "blended", "bark")
 _MOST_KEPT = 12
+_LEAVES = 0.6  # of a leaf's colour that is seen on its side away from the sun
 _ACROSS = 0.45  # of the light that a slope gets more or less
 
 
@@ -52,6 +53,7 @@ class Surfaces:
     def __init__(self, app: App) -> None:
         self._app = app
         self._kept: dict[_Wanted, list[Part]] = {}
+        self._said: dict[_Wanted, tuple[str, ...]] = {}  # what is not to be seen, and why
         self._making: _Wanted | None = None
         self._shown: _Wanted | None = None
         self._refused: tuple[tuple[int, int], str] | None = None  # tree and year, and why
@@ -133,10 +135,11 @@ class Surfaces:
             stage.dress(None)
             return
         parts = [_unbumped(part) for part in self._kept[wanted]]
-        stage.put("surface", lambda plotter: add_textured(plotter, parts))
+        stage.put("surface", lambda plotter: _add(plotter, parts))
         stage.dress(wanted.tree_id)
         count = sum(len(part.mesh.triangles) for part in parts)
-        self._app.state.shape_said = f"{SHAPES[wanted.shape][1]}: {count:,} triangles"
+        said = f"{SHAPES[wanted.shape][1]}: {count:,} triangles"
+        self._app.state.shape_said = ". ".join((said, *self._said.get(wanted, ())))
 
     def bark_at(self, ray: Ray) -> Vector | None:
         """Give where a line of sight meets the bark that is shown, m; None if it meets none."""
@@ -162,8 +165,11 @@ class Surfaces:
             state.shape_busy = True
             state.shape_said = f"making {SHAPES[wanted.shape][0].lower()} (seconds to a minute)"
         try:
-            parts = await asyncio.to_thread(app.source.surface, *wanted[:3])
+            said: list[str] = []
+            parts = await asyncio.to_thread(app.source.surface, *wanted[:3], said.append)
             self._kept = dict([*self._kept.items(), (wanted, parts)][-_MOST_KEPT:])
+            self._said = {key: self._said[key] for key in self._said if key in self._kept}
+            self._said[wanted] = tuple(said)
         except InputError as error:
             self._refused = wanted[:2], str(error)
         with state:
@@ -171,6 +177,15 @@ class Surfaces:
             if self._refused and (app.chosen, app.year, state.shape) == wanted[:3]:
                 state.shape = "branches"
             app.refresh()
+
+
+def _add(plotter: Any, parts: list[Part]) -> None:
+    """Add a surface; leaves, which are cut out of cards, let light through."""
+    before = set(plotter.actors)
+    add_textured(plotter, parts)
+    for name in set(plotter.actors) - before:
+        if plotter.actors[name].GetForceOpaque():
+            plotter.actors[name].prop.ambient = _LEAVES
 
 
 def _unbumped(part: Part) -> Part:
@@ -192,7 +207,12 @@ def _unbumped(part: Part) -> Part:
 
 
 def surface_parts(
-    run: Run, tree_id: int, year: int, shape: str, waiting: Sequence[Crack] = ()
+    run: Run,
+    tree_id: int,
+    year: int,
+    shape: str,
+    waiting: Sequence[Crack] = (),
+    say: Callable[[str], None] = lambda line: None,
 ) -> list[Part]:
     """Make a sample tree's surface, as `output.sample_trees.meshes` writes it.
 
@@ -204,6 +224,8 @@ def surface_parts(
         "tubes", "blended" or "bark".
     waiting : sequence of Crack, optional
         Cracks of the bark that wait for the next year.
+    say : callable, optional
+        Is told in a line of each crack that is not to be seen.
 
     Raises
     ------
@@ -224,7 +246,8 @@ def surface_parts(
             f"tree {tree_id} has no bark that could be seen: it is {200.0 * thick:.1f} cm thick",
             expected=f"{200.0 * LEAST_RADIUS_M:g} cm or more",
         )
-    return [*barked_parts(run, skeleton, year, tubes(skeleton), waiting=waiting), *parts[1:]]
+    wood = tubes(skeleton)
+    return [*barked_parts(run, skeleton, year, wood, waiting=waiting, say=say), *parts[1:]]
 
 
 def wood_parts(skeleton: Skeleton, species: Species, shape: str) -> list[Part]:

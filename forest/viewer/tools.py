@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from forest.viewer.picking import Hit
 
@@ -68,3 +68,23 @@ class PickTool:
 
     def wheel(self, turns: float) -> None:
         """Nothing: the wheel moves the view."""
+
+
+class Options(Protocol):
+    """What a tool can be told, in the panel beside the view.
+
+    Attributes
+    ----------
+    tool : str
+        Its name.
+    """
+
+    @property
+    def tool(self) -> str:
+        """Its name."""
+
+    def build(self, v: Any, html: Any) -> None:
+        """Make its widgets, of vuetify and plain HTML."""
+
+    def refresh(self) -> None:
+        """Bring them up to date with the stand."""

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from forest.errors import InputError, years_of
 from forest.viewer.desk import Desk
+from forest.viewer.fell_tool import words_of_rule
+from forest.viewer.fields import text_field
 
 if TYPE_CHECKING:
     from forest.live import LiveSession
-    from forest.viewer.tool_options import Options
+    from forest.viewer.tools import Options
 
 _MOST_SHOWN = 6  # ids in a line
 
@@ -41,6 +43,8 @@ def words_of(act: dict[str, Any]) -> str:
     if kind == "stroke":
         only = f", metamer {act['metamer']} alone grows" if act.get("metamer") is not None else ""
         return f"stroke of {len(act['points_m'])} points{only}"
+    if said := words_of_rule(act):
+        return said
     rule = (
         f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}"
         for key, value in act.items()
@@ -73,7 +77,7 @@ class WorkPanel:
                 "live_replay": shlex.join(
                     ["forest", "run", str(self._file), "--out", f"{self._file.stem}.h5"]
                 ),
-                "live_run_file": f"{self._file.stem}.h5",
+                "run_file": f"{self._file.stem}.h5",
                 "live_saved": "",
             }
         )
@@ -99,17 +103,9 @@ class WorkPanel:
         html.Div("The same stand, grown again without this page:", classes="quiet mt-2")
         html.Code("{{ live_replay }}", style="word-break: break-all;")
         with html.Div(classes="d-flex align-center mt-3"):
-            v.VTextField(
-                v_model=("live_run_file",),
-                label="Run file",
-                density="compact",
-                variant="outlined",
-                hide_details=True,
-                id="run-file",
-            )
-            v.VBtn(
-                "Save", variant="text", click="trigger('save_run', [live_run_file])", id="save-run"
-            )
+            go = "trigger('save_run', [run_file])"
+            text_field(v, "run_file", "Run file", enter=go)
+            v.VBtn("Save", variant="text", click=go, id="save-run")
         html.Div("{{ live_saved }}", classes="quiet mt-1", id="saved")
 
     def _build_years(self, v: Any, html: Any) -> None:

@@ -79,6 +79,7 @@ def _turn(stage: Any) -> None:
 
     width, height = stage.plotter.window_size
     stage.plotter.window_size = [int(_RATIO * width), int(_RATIO * height)]
+    stage.window.SetMultiSamples(0)
     for _ in range(_TURNS):
         stage.plotter.camera.Azimuth(3.0)
         stage.plotter.renderer.ResetCameraClippingRange()

@@ -108,6 +108,21 @@ def test_bark_is_torn_there_and_from_then_on(runs: tuple[Run, Run]) -> None:
         np.testing.assert_array_equal(one.width, other.width)
 
 
+def test_it_is_told_what_is_not_to_be_seen(runs: tuple[Run, Run]) -> None:
+    """A second crack at the same place has no room, one high up no strip."""
+    run, _ = runs
+    again = Crack(_YEAR + 1, _HEIGHT, _AZIMUTH)
+    high = Crack(_YEAR, 0.9 * float(run.skeleton(_TREE, int(run.years[-1])).end[:, 2].max()), 0.0)
+    bark = grown(run, "beech", (Crack(_YEAR, _HEIGHT, _AZIMUTH), again, high))
+    assert [missed.crack for missed in bark.missed] == [high, again]
+    assert str(bark.missed[1]) == (
+        "the crack of 2006 at 0.15 m, 130 degrees is not to be seen: "
+        "the bark was already torn there"
+    )
+    assert "thinner than 0.004 m" in bark.missed[0].why
+    assert [missed.crack for missed in bark.at(_YEAR).missed] == [high]
+
+
 def test_a_crack_that_waits_is_there_at_once(runs: tuple[Run, Run]) -> None:
     run, _ = runs
     crack = Crack(int(run.years[-1]) + 1, _HEIGHT, _AZIMUTH)

@@ -234,22 +234,17 @@ def test_finer_strips_tell_the_same() -> None:
         assert fine[name] == pytest.approx(value, rel=0.15), name
 
 
-@pytest.mark.parametrize("substeps", [2, 4])
-def test_finer_steps_tell_the_same(substeps: int) -> None:
-    """What one counts, the number and length of fractures too, hangs little on the time step."""
+@pytest.mark.parametrize(("substeps", "soft"), [(8, 20.0), (16, 5.0)])
+def test_finer_steps_tell_the_same(substeps: int, soft: float) -> None:
+    """What one counts, number and length of fractures too, does not hang on the time step."""
     coarse, fine = {}, {}
     for seed in range(1, 4):
         for parts, into in ((1, coarse), (substeps, fine)):
-            for name, value in statistics(grown(100, 0.6, 1.2, 20, seed, substeps=parts)).items():
+            bark = grown(60, 0.6, 1.2, 20, seed, substeps=parts, fracture_stiffness=soft)
+            for name, value in statistics(bark).items():
                 into[name] = into.get(name, 0.0) + value / 3
-    for name, most in (
-        ("fractures across a girth", 0.03),
-        ("share", 0.01),
-        ("width", 0.03),
-        ("length", 0.2),
-        ("fractures per m2", 0.3),
-    ):
-        assert fine[name] == pytest.approx(coarse[name], rel=most), name
+    for name, value in coarse.items():
+        assert fine[name] == pytest.approx(value, rel=0.1), name
 
 
 def test_strips_that_come_later() -> None:

@@ -68,9 +68,9 @@ def find_browser() -> str:
     return path
 
 
-def open_page(browser: Any, address: str) -> Any:
+def open_page(browser: Any, address: str, *, width: int = 1200, height: int = 760) -> Any:
     """Open the viewer's page, and collect what it complains of and what it asks others for."""
-    page = browser.new_page(viewport={"width": 1200, "height": 760})
+    page = browser.new_page(viewport={"width": width, "height": height})
     page.complaints = []
     page.strangers = []
 
@@ -101,6 +101,12 @@ def still(page: Any) -> bytes:
             return now
         before = now
     raise AssertionError("the picture did not come to rest")
+
+
+def heard(page: Any) -> None:
+    """Wait until the server has done what the page has sent, and the page shows it."""
+    page.evaluate("window.trame.trigger('key', [''])")  # a key of no meaning, answered in turn
+    page.wait_for_timeout(50)
 
 
 def changed(page: Any, before: bytes) -> bytes:

@@ -15,7 +15,7 @@ from forest.record.run import open_run
 from forest.scenario import Scenario
 from forest.simulation import simulate
 from tests.tiny import assert_same_runs, forest
-from tests.viewer.browser import Viewing, changed, open_page, still, wait_for_text
+from tests.viewer.browser import Viewing, changed, heard, open_page, still, wait_for_text
 
 _GROWN = 9
 _LAST = 2000 + _GROWN
@@ -112,7 +112,7 @@ def _a_branch(page: Any) -> tuple[float, float, int, int]:
     for across in (0.5, 0.2, 0.22, 0.52, 0.24, 0.18, 0.8, 0.82):
         for down in [0.38 + 0.02 * k for k in range(14)]:
             _click(page, across, down)
-            page.wait_for_timeout(120)
+            heard(page)
             if not page.locator("#prune-lit").count():
                 continue
             said = re.findall(r"Tree (\d+), metamer (\d+): (\d+)", page.inner_text("#prune-lit"))
@@ -120,7 +120,7 @@ def _a_branch(page: Any) -> tuple[float, float, int, int]:
             if serial > 0 and metamers > 1:
                 return across, down, tree, serial
             _click(page, 0.03, 0.2)  # the sky: nothing is lit
-            page.wait_for_timeout(120)
+            heard(page)
     raise AssertionError("no branch was met")
 
 
@@ -168,9 +168,15 @@ def test_trees_are_felled_and_marked_and_acts_taken_back(page: Any, kept: Kept) 
     wait_for_text(page, "#panel-work", "fell trees 1, 2")
     page.click("#undo")
     wait_for_text(page, "#panel-work", "Nothing waits")
-    page.fill("#fell-value", "2000")
+    wait_for_text(page, "#fell-said", "Would fell 1 of 3 trees")  # a light thinning from below
+    page.click("#fell-to", force=True)
+    page.click(".v-list-item:has-text('leave N')")
+    heard(page)
+    page.fill("#fell-value", "700")
+    wait_for_text(page, "#fell-said", "Would fell 2 of 3 trees")
     page.click("#fell-rule-go")
-    wait_for_text(page, "#panel-work", "thin below, n_ha 2000")
+    wait_for_text(page, "#panel-work", "thin from below, leave N 700/ha")
+    wait_for_text(page, "#fell-said", "Would fell 0 of 1 trees")
     page.click("#undo")
     wait_for_text(page, "#panel-work", "Nothing waits")
     page.fill("#fell-ids", "1, 99")
@@ -180,7 +186,7 @@ def test_trees_are_felled_and_marked_and_acts_taken_back(page: Any, kept: Kept) 
     _take(page, "Mark")
     for down in (0.5, 0.48, 0.52, 0.46, 0.54, 0.56, 0.44):  # the tree in the middle, by its stem
         _click(page, 0.5, down)
-        page.wait_for_timeout(300)
+        heard(page)
         if "mark tree 1" in page.inner_text("#panel-work"):
             break
     wait_for_text(page, "#panel-work", "mark tree 1")
@@ -251,6 +257,31 @@ def test_a_stroke_of_the_brush_lays_markers(page: Any, kept: Kept) -> None:
     assert len(act["points_m"]) > 2 and act["points_m"][-1][2] > act["points_m"][0][2] > -0.1
     session = take_up(Scenario.load(kept.scenario), kept.session)
     assert len(session.markers_to_come) > 50
+
+
+def test_a_stroke_is_as_thick_as_the_pen_is_pressed(page: Any, kept: Kept) -> None:
+    box = page.locator("#picture").bounding_box()
+    x, y = box["x"] + 0.3 * box["width"], box["y"] + 0.6 * box["height"]
+    page.mouse.move(x, y)
+    before = len(kept.acts)
+    pen = page.context.new_cdp_session(page)
+
+    def sent(kind: str, k: int, force: float) -> None:
+        held = {"button": "left", "buttons": 0 if kind == "mouseReleased" else 1, "clickCount": 1}
+        at = {"x": x, "y": y - 25 * k, "force": force, "pointerType": "pen"}
+        pen.send("Input.dispatchMouseEvent", {"type": kind, **at, **held})
+
+    sent("mousePressed", 0, 0.25)
+    pressures = (0.25, 0.25, 0.5, 0.75, 1.0)
+    for k, force in enumerate(pressures):
+        sent("mouseMoved", k + 1, force)
+    sent("mouseReleased", len(pressures), 0.0)
+    heard(page)
+    assert len(kept.acts) == before + 1
+    act = kept.acts[-1]
+    radius = [0.224 * force / 0.5 for force in pressures]
+    assert act["radius_m"][: len(radius)] == pytest.approx(radius, abs=2e-4)
+    page.click("#undo")
 
 
 def test_two_pages_and_one_opened_later_show_one_session(

@@ -28,6 +28,7 @@ def source() -> LiveSource:
 def test_it_shows_the_years_so_far_and_the_stand_as_it_began(source: LiveSource) -> None:
     assert source.years == (2000, 2001, 2002, 2003)
     assert len(source.trees(2000)) == 3 and source.trees(2000)["ring_width_mm"].isna().all()
+    assert set(source.trees(2000)["status"]) == {"living"}
     assert source.trees(2003)["height_m"].tolist() == source.living["height_m"].tolist()
     assert source.life(2)["year"].tolist() == [2001, 2002, 2003]
     source.session.step()
@@ -95,7 +96,7 @@ def test_rays_meet_boxes() -> None:
         ({"kind": "mark", "tree_ids": [3, 4], "mark": "crop"}, "mark trees 3, 4 'crop'"),
         ({"kind": "prune", "tree_id": 2, "metamer": 7}, "prune tree 2 at metamer 7"),
         ({"kind": "obstacle", "remove": "wall"}, "remove wall"),
-        ({"kind": "thin", "method": "below", "n_ha": 800.0}, "thin below, n_ha 800"),
+        ({"kind": "thin", "method": "below", "n_ha": 800.0}, "thin from below, leave N 800/ha"),
     ],
 )
 def test_acts_are_said_in_words(act: dict[str, object], said: str) -> None:

@@ -31,8 +31,11 @@ def _to_year(page: Any, year: int) -> None:
         wait_for_text(page, "#year", str(shown + (1 if shown < year else -1)))
 
 
-def _places(page: Any, run_path: Path) -> dict[int, tuple[float, float]]:
-    """Find where trees are seen in the last year, as pixels of the page: by the same stage."""
+def _places(page: Any, run_path: Path, sized: Any = None) -> dict[int, tuple[float, float]]:
+    """Find where trees are seen in the last year, as pixels of the page: by the same stage.
+
+    `sized` is the page whose size the picture has; it is shown whole in the middle of others.
+    """
     with open_run(run_path) as run:
         source = RunSource(run)
         trees = source.trees(source.years[-1])
@@ -40,13 +43,18 @@ def _places(page: Any, run_path: Path) -> dict[int, tuple[float, float]]:
     stage.show_trees(trees, colour_trees(source, trees, "species")[0])
     stage.look("stand")
     box = page.locator("#picture").bounding_box()
-    stage.plotter.window_size = [int(box["width"]), int(box["height"])]
+    own = (sized or page).locator("#picture").bounding_box()
+    wide, high = int(own["width"]), int(own["height"])
+    stage.plotter.window_size = [wide, high]
+    scale = min(box["width"] / wide, box["height"] / high)
+    left = box["x"] + 0.5 * (box["width"] - scale * wide)
+    top = box["y"] + 0.5 * (box["height"] - scale * high)
     found: dict[int, tuple[float, float]] = {}
     for down in np.arange(0.04, 1.0, 0.04):
         for across in np.arange(0.04, 1.0, 0.04):
             tree = stage.hit(across, down).tree_id
             if tree is not None:
-                found[tree] = (box["x"] + across * box["width"], box["y"] + down * box["height"])
+                found[tree] = (left + across * scale * wide, top + down * scale * high)
     return found
 
 
@@ -89,6 +97,31 @@ def test_a_click_chooses_a_tree_and_its_card_says_what_is_on_file(
     said = page.inner_text("#card td[data-column=dbh_cm]")
     assert said == f"{row['dbh_cm']:.1f} cm"
     assert page.inner_text("#card td[data-column=height_m]") == f"{row['height_m']:.1f} m"
+
+
+def test_clicks_choose_the_right_tree_in_pages_of_different_sizes(
+    browser: Any, viewing: Viewing, page: Any, run_path: Path
+) -> None:
+    page.click("#look-stand")
+    box = page.locator("#picture").bounding_box()
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    other = open_page(browser, viewing.address, width=760, height=900)
+    still(page)
+
+    def choose(where: Any, sized: Any, which: int) -> None:
+        tree, place = sorted(_places(where, run_path, sized).items())[which]
+        where.mouse.click(*place)
+        for each in (page, other):
+            wait_for_text(each, "#card-title", f"Tree {tree} ")
+
+    choose(page, other, 0)  # the pointer was there before: the picture keeps the other's size
+    choose(other, other, 1)
+    page.mouse.move(4, 4)
+    page.mouse.move(box["x"] + 5, box["y"] + 5)  # it comes again: the picture fits this page
+    still(page)
+    choose(page, page, 2)
+    assert other.complaints == []
+    other.close()
 
 
 def test_a_tree_is_found_by_its_number_and_cut(page: Any) -> None:

@@ -7,12 +7,15 @@ import http.client
 import os
 import signal
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from forest.errors import InputError
 from forest.viewer.guard import is_own_host, is_own_origin
+from forest.viewer.peers import is_own_user
 from forest.viewer.server import DEFAULT_PORT, free_port
 from tests.tiny import forest
 from tests.viewer.browser import Viewing
@@ -54,6 +57,83 @@ def test_only_its_own_name_and_pages_are_answered(viewing: Viewing) -> None:
     for origin in ("http://evil.example", f"https://127.0.0.1:{port}", "null", "http://localhost"):
         assert _upgrade(port, origin) == 403
     assert _asked(port, "/../../etc/passwd") in (403, 404)
+
+
+def test_where_the_websocket_is_nothing_else_is_answered(viewing: Viewing) -> None:
+    assert _asked(viewing.port, "/ws") == 426
+
+
+_AS_NOBODY = """
+import encodings.idna, os, socket
+os.setgroups([]), os.setgid(65534), os.setuid(65534)
+with socket.create_connection(("127.0.0.1", {port}), timeout=20) as line:
+    line.sendall(b"GET {path} HTTP/1.1\\r\\nHost: 127.0.0.1:{port}\\r\\n\\r\\n")
+    print(line.recv(4000).decode())
+"""
+
+
+@pytest.mark.skipif(os.name != "posix" or os.getuid() != 0, reason="only root can be another user")
+@pytest.mark.parametrize("path", ["/", "/ws"])
+def test_other_users_of_the_machine_are_refused(viewing: Viewing, path: str) -> None:
+    code = _AS_NOBODY.format(port=viewing.port, path=path)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.startswith("HTTP/1.1 403"), done
+    assert "user who started it" in done.stdout
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="this system does not tell")
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_the_kernel_tells_whose_a_connection_is(host: str) -> None:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as server, socket.socket(family) as client:
+        try:
+            server.bind((host, 0))
+        except OSError:
+            pytest.skip("no such interface")
+        server.listen()
+        client.connect(server.getsockname()[:2])
+        line, peer = server.accept()
+        with line:
+            here = line.getsockname()[:2]
+            assert is_own_user(peer[:2], here)
+            assert not is_own_user((host, 1), here)
+            client.close()  # its process holds it no longer
+            assert not is_own_user(peer[:2], here)
+
+
+_HELD = """
+import asyncio, os, time
+from types import SimpleNamespace
+from forest.viewer.server import serve
+
+class Server:
+    controller = SimpleNamespace(on_server_bind=set(), on_server_ready=set())
+    async def start(self, **_):
+        asyncio.get_running_loop().run_in_executor(None, time.sleep, 600)  # as a year does
+        print("ready", flush=True)
+        await asyncio.Event().wait()
+    async def stop(self):
+        pass
+
+serve(Server(), host="127.0.0.1", port=1, ready=print,
+      stopping=lambda: print("finishing", flush=True), at_once=lambda: os._exit(130))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_must_end_first_is_said_and_a_second_signal_does_not_wait(number: int) -> None:
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", _HELD], stdout=pipe, text=True) as held:
+        assert held.stdout is not None
+        try:
+            assert held.stdout.readline() == "ready\n"
+            held.send_signal(number)
+            assert held.stdout.readline() == "finishing\n"
+            assert held.poll() is None
+            held.send_signal(number)
+            assert held.wait(60) == 130
+        finally:
+            held.kill()
 
 
 def test_it_listens_on_loopback_alone(viewing: Viewing) -> None:

@@ -47,6 +47,29 @@ class Crack(NamedTuple):
     height_m: float
     azimuth_deg: float
 
+    def __str__(self) -> str:
+        """Tell which crack it is."""
+        place = f"{self.height_m:.2f} m, {self.azimuth_deg % 360.0:.0f} degrees"
+        return f"the crack of {self.year} at {place}"
+
+
+class Missed(NamedTuple):
+    """A crack that could not be made.
+
+    Attributes
+    ----------
+    crack : Crack
+    why : str
+        In words.
+    """
+
+    crack: Crack
+    why: str
+
+    def __str__(self) -> str:
+        """Tell it in a line."""
+        return f"{self.crack} is not to be seen: {self.why}"
+
 
 class Trigger(NamedTuple):
     """The same on strips.
@@ -58,11 +81,14 @@ class Trigger(NamedTuple):
     strip : int
     turn : float
         Part of a turn from the seam.
+    crack : Crack
+        What it stands for.
     """
 
     row: int
     strip: int
     turn: float
+    crack: Crack
 
 
 def recorded_cracks(run: Run, tree_id: int, year: int) -> tuple[Crack, ...]:
@@ -119,7 +145,7 @@ def triggers_of(
         strip = int(strips[np.argmin(np.abs(tree.geometry.along[strips] - v[0]))])
         born = int(np.argmax(~np.isnan(history.girth[:, strip]))) + 1
         row = max(int(np.searchsorted(history.times, crack.year, side="left")), born)
-        found.append(Trigger(row, strip, float(turn[0])))
+        found.append(Trigger(row, strip, float(turn[0]), crack))
     return tuple(sorted(found, key=lambda trigger: trigger.row))
 
 
@@ -142,11 +168,14 @@ def place_on_stem(skeleton: Skeleton, point_m: NDArray[np.float64]) -> tuple[flo
 
 
 def torn(bark: Bark, trigger: Trigger) -> Bark:
-    """Tear bark at a trigger; where it is open, or a fracture is near, it stays as it is."""
-    try:
-        return bark.trigger(trigger.strip, bark.around(trigger.strip, trigger.turn), GAP_M)
-    except InputError:  # no room between the fractures that are there
-        return bark
+    """Tear bark at a trigger.
+
+    Raises
+    ------
+    InputError
+        Where it is open already, or a fracture is near.
+    """
+    return bark.trigger(trigger.strip, bark.around(trigger.strip, trigger.turn), GAP_M)
 
 
 def _cut(

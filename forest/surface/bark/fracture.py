@@ -128,22 +128,48 @@ def seek_weakest(rings: Any, physics: Any, s: Any, i: Any) -> None:
 
 
 @njit
+def _renew(rings: Any, physics: Any, s: Any, i: Any) -> None:
+    """Seek the weakest place of a piece anew if it has lost its own."""
+    lo, hi = room_to_break(rings, physics, s, i)
+    if not lo <= rings.weak[i] <= hi:
+        seek_weakest(rings, physics, s, i)
+
+
+@njit
+def bears_at(rings: Any, physics: Any, s: Any, i: Any, place: Any) -> Any:
+    """Factor on the strain that the piece behind record i bears before it breaks at a place.
+
+    That of its weakest grain, and what the weakness map has at the place itself.
+    """
+    _renew(rings, physics, s, i)
+    here = contrast(rings, physics, _grain(rings, physics, s, place))
+    if not np.isfinite(rings.tough[i]):  # no room to break unaided
+        return here
+    weakest = _grain(rings, physics, s, rings.weak[i])
+    return rings.tough[i] / contrast(rings, physics, weakest) * here
+
+
+@njit
+def _grain(rings: Any, physics: Any, s: Any, place: Any) -> Any:
+    """Find the grain at a place on the epidermis."""
+    return min(rings.cell[s] + np.int64(place / physics.grain_m), rings.cell[s + 1] - 1)
+
+
+@njit
 def worst_piece(rings: Any, physics: Any, s: Any) -> Any:
-    """Find the piece of a strip most beyond its threshold: its record, or -1."""
+    """Find the piece of a strip most beyond its threshold: its record (-1 for none) and load."""
     worst: Any = np.int64(-1)
-    most = 1.0 + 1e-9  # growth ratios carry rounding
+    most = 0.0
     floor = np.exp(-_MOST * physics.threshold_jitter)
     for i in range(rings.base[s], rings.base[s] + rings.records[s]):
         load = overload(rings, s, i)
         if load <= floor:
             continue
-        lo, hi = room_to_break(rings, physics, s, i)
-        if not lo <= rings.weak[i] <= hi:
-            seek_weakest(rings, physics, s, i)
+        _renew(rings, physics, s, i)
         if load / rings.tough[i] > most:
             most = load / rings.tough[i]
             worst = i
-    return worst
+    return worst, most
 
 
 @njit

@@ -19,9 +19,9 @@ from forest.surface.bark.checks import (
     checked_weakness,
     girths_from_birth,
 )
+from forest.surface.bark.events import begin_fracture, tear_all
 from forest.surface.bark.fracture import room_to_break, settle, weigh_all
 from forest.surface.bark.material import Material, Physics
-from forest.surface.bark.propagation import begin_fracture, tear_all
 from forest.surface.bark.rings import Rings, copied, stretch_all, turn_of, x_of
 from forest.surface.bark.strips import (
     FRACTURE,
@@ -50,7 +50,7 @@ class Snapshot(NamedTuple):
 class Bark(BarkView):
     """Bark at one time. Its verbs give another bark; this one stays as it is.
 
-    Memory: 49 bytes an element (two to a fracture), and inside 136 bytes a possible fracture (one
+    Memory: 49 bytes an element (two to a fracture), and inside 160 bytes a possible fracture (one
     to each `least_piece_m` of epidermis) and 12 a grain.
     """
 
@@ -76,7 +76,8 @@ class Bark(BarkView):
         dilatation : float64 (strips, sectors) or (steps, strips, sectors), optional
             How fast each sector around the girth stretches, relative to the others (from the seam).
         substeps : int
-            Into how many parts of equal ratio each step is cut.
+            Into how many parts of equal ratio the loading of each step is cut; one is enough, since
+            what is loaded most yields first (`forest.surface.bark.events`).
         keep : bool
             Keep a snapshot of every step in `history`.
 
@@ -301,11 +302,8 @@ def _advance(
     girth = part.girth
     edges = _stretched(rings.edges, rings.girth, girth, spread)
     physics = Physics.of(bark.material, begins=part.number == 1, ends=part.number == substeps)
-    worst = np.zeros(len(girth))
-    in_threads(stretch_all, rings, physics, girth, edges, worst)
-    order = np.argsort(-worst, kind="stable")
-    crossings = bark.geometry.crossings
-    tear_all(rings, physics, np.int64(bark.seed), crossings, order, time)
+    in_threads(stretch_all, rings, physics, girth, edges)
+    tear_all(rings, physics, np.int64(bark.seed), bark.geometry.crossings, time)
 
 
 def _force_open(rings: Rings, physics: Physics, fracture: int, gap_m: float) -> None:

@@ -53,7 +53,7 @@ class Material:
     inglis: float = 4.0
     #: Share of its threshold that the next strip must bear for a fracture to run into it; 0 is the
     #: paper's rule, by the Inglis ratio alone.
-    arrest: float = 0.5
+    arrest: float = 0.6
     #: The most by which an end of a fracture runs on in one step, m: brittle bark tears at once
     #: (the paper's rule, without limit), ductile bark slowly, so that fractures taper.
     run_m: float = 0.05

@@ -1,4 +1,4 @@
-"""How fractures run from strip to strip, and the order of events in a step (3.2.4, figure 8)."""
+"""How fractures run from strip to strip (Lefebvre and Neyret 2002, 3.2.4)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from forest._jit import njit
 from forest.random import STREAM_BARK, uniforms
-from forest.surface.bark.fracture import contrast, nearest_fracture, settle, tear, worst_piece
+from forest.surface.bark.fracture import bears_at, nearest_fracture, settle, tear
 from forest.surface.bark.rings import overload, rest_of, turn_of, x_of
 
 _UP = np.int64(1)
@@ -76,8 +76,15 @@ def _next_strip(rings: Any, crossings: Any, s: Any, runs: Any, turn: Any) -> Any
 
 
 @njit
-def _mean_width(rings: Any, fracture: Any) -> Any:
-    return rings.area[fracture] / rings.reach[fracture]
+def _area(rings: Any, fracture: Any, moment: Any) -> Any:
+    """Area that a fracture has opened at a moment of the step, m2."""
+    kept = rings.kept[fracture]
+    return kept + moment * (rings.area[fracture] - kept)
+
+
+@njit
+def _mean_width(rings: Any, fracture: Any, moment: Any) -> Any:
+    return _area(rings, fracture, moment) / rings.reach[fracture]
 
 
 @njit
@@ -106,7 +113,7 @@ def _around(rings: Any, s: Any, x: Any) -> Any:
 
 
 @njit
-def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any) -> Any:
+def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any, moment: Any) -> Any:
     """By what part of a turn the course follows the edge of the nearest fracture (3.2.4).
 
     Lines of equal strain run along a fracture's edges. Its influence is all or nothing: within
@@ -116,7 +123,8 @@ def _bend(rings: Any, physics: Any, s: Any, to: Any, runs: Any, x: Any) -> Any:
     if j < 0 or side == 0:
         return 0.0
     node = np.int64(rings.tear[j])
-    if gap >= physics.influence * _mean_width(rings, np.int64(rings.tear_fracture[node])):
+    other = np.int64(rings.tear_fracture[node])
+    if gap >= physics.influence * _mean_width(rings, other, moment):
         return 0.0
     back = np.int64(rings.tear_down[node] if runs > 0 else rings.tear_up[node])
     if back < 0 or rings.tear_strip[back] != s:
@@ -146,144 +154,108 @@ def _stray(rings: Any, physics: Any, seed: Any, fracture: Any, to: Any) -> Any:
 
 
 @njit
-def _step(
-    rings: Any, physics: Any, seed: Any, crossings: Any, node: Any, runs: Any, time: Any
+def _end_of(rings: Any, fracture: Any, upper: Any) -> Any:
+    """Find a fracture's upper (1) or lower (0) end: its tear, and which way it runs there."""
+    node = np.int64(rings.last[fracture] if upper else rings.first[fracture])
+    ahead = rings.tear_up[node] if upper else rings.tear_down[node]
+    behind = rings.tear_down[node] if upper else rings.tear_up[node]
+    runs = _UP if upper else _DOWN
+    if ahead >= 0 and behind < 0 and rings.first[fracture] != rings.last[fracture]:
+        runs = -runs  # it came over a passage that turned it round
+    return node, runs
+
+
+@njit
+def _is_held(rings: Any, physics: Any, fracture: Any, upper: Any, moment: Any) -> Any:
+    """Whether an end has run as far as it may in this step, or the Inglis ratio is too small."""
+    reach = rings.reach[fracture]
+    if reach < physics.flaw_m:
+        return False
+    ran = rings.ran[fracture, upper] > physics.run_m
+    return ran or not reach * reach > physics.inglis * _area(rings, fracture, moment)
+
+
+@njit
+def ahead_of(
+    rings: Any, physics: Any, seed: Any, crossings: Any, fracture: Any, upper: Any, moment: Any
 ) -> Any:
-    """Try to break the strip next to a fracture's end. Returns the tear (-1) and its direction."""
+    """Find where an end of a fracture would run on, and how strongly it is drawn there.
+
+    It can while its length over its width exceeds the Inglis threshold, and the next strip bears
+    at least the `arrest` share of what would break it unaided. `moment` says how much of the
+    step's strain is there: fractures are so wide by then.
+
+    Returns the load (1 where it just runs, 0 where it is stopped, infinite for a flaw), record and
+    strip, place on the epidermis, and which way it goes on from there.
+    """
+    node, runs = _end_of(rings, fracture, upper)
+    none = (0.0, np.int64(-1), np.int64(-1), 0.0, runs)
+    if _is_held(rings, physics, fracture, upper, moment):
+        return none
     s = np.int64(rings.tear_strip[node])
-    fracture = np.int64(rings.tear_fracture[node])
     i = _record_of(rings, node)
     x = rings.left[i] + 0.5 * rings.open[i]
     turn = turn_of(rings.edges[s], rings.girth[s], x)
     to, turn, goes = _next_strip(rings, crossings, s, runs, turn)
-    none = np.int64(-1)
     if to < 0:
-        return none, goes
+        return none
     if rings.axis[to] == rings.axis[s]:
         straight = x_of(rings.edges[to], turn)
-        turn += _bend(rings, physics, s, to, runs, straight)
+        turn += _bend(rings, physics, s, to, runs, straight, moment)
         run = 0.5 * (rings.width[to] + rings.width[s])
         turn += _stray(rings, physics, seed, fracture, to) * run / rings.girth[to]
     x = x_of(rings.edges[to], turn)
     near, side, gap = _around(rings, to, x)
     if near >= 0:
         other = np.int64(rings.tear_fracture[rings.tear[near]])
-        if side == 0 or gap < physics.stand_off * _mean_width(rings, other):
-            return none, goes
+        if side == 0 or gap < physics.stand_off * _mean_width(rings, other, moment):
+            return none
     k, x = _piece_at(rings, to, x)
     part = (x - rings.left[k] - rings.open[k]) / rings.piece[k]
     place = rings.place[k] + part * rest_of(rings, to, k)
-    grain = rings.cell[to] + np.int64(place / physics.grain_m)
-    needed = physics.arrest * contrast(rings, physics, min(grain, rings.cell[to + 1] - 1))
-    if rings.reach[fracture] >= physics.flaw_m and not overload(rings, to, k) >= needed:
-        return none, goes
     for way in (_DOWN, _UP):
         j, turns = nearest_fracture(rings, to, k, way)
         if j >= 0:
             apart = abs(rings.place[j] + turns * rings.length[to] - place)
             if apart < physics.least_piece_m:
-                return none, goes
-    return tear(rings, to, k, place, fracture, time), goes
+                return none
+    load = np.inf
+    if rings.reach[fracture] >= physics.flaw_m and physics.arrest > 0.0:
+        needed = physics.arrest * bears_at(rings, physics, to, k, place)
+        load = overload(rings, to, k) / needed
+    return load, k, to, place, goes
 
 
 @njit
 def run_on(
-    rings: Any, physics: Any, seed: Any, crossings: Any, fracture: Any, end: Any, time: Any
-) -> None:
-    """Let the upper (+1) or lower (-1) end of a fracture run on from strip to strip.
-
-    It can while its length over its width exceeds the Inglis threshold, and the next strip bears
-    at least the `arrest` share of what would break it unaided.
-    """
-    upper = end > 0
-    node = np.int64(rings.last[fracture] if upper else rings.first[fracture])
-    ahead = rings.tear_up[node] if upper else rings.tear_down[node]
-    behind = rings.tear_down[node] if upper else rings.tear_up[node]
-    runs = end
-    if ahead >= 0 and behind < 0 and rings.first[fracture] != rings.last[fracture]:
-        runs = -runs  # it came over a passage that turned it round
-    run = 0.0
-    while True:
-        reach = rings.reach[fracture]
-        opened = rings.area[fracture]
-        stops = run > physics.run_m or not reach * reach > physics.inglis * opened
-        if reach >= physics.flaw_m and stops:
-            return
-        new, goes = _step(rings, physics, seed, crossings, node, runs, time)
-        if new < 0:
-            return
-        if runs > 0:
-            rings.tear_up[node] = new
-        else:
-            rings.tear_down[node] = new
-        if goes > 0:
-            rings.tear_down[new] = node
-        else:
-            rings.tear_up[new] = node
-        if upper:
-            rings.last[fracture] = new
-        else:
-            rings.first[fracture] = new
-        to = np.int64(rings.tear_strip[new])
-        rings.reach[fracture] += rings.width[to]
-        run += rings.width[to]
-        settle(rings, physics, to)
-        node = np.int64(new)
-        runs = goes
-
-
-@njit
-def begin_fracture(
     rings: Any,
     physics: Any,
-    seed: Any,
-    crossings: Any,
-    s: Any,
-    i: Any,
+    fracture: Any,
+    upper: Any,
+    k: Any,
+    to: Any,
     place: Any,
+    goes: Any,
     time: Any,
 ) -> Any:
-    """Tear the piece behind record i open at a place and let the fracture run both ways."""
-    fracture = rings.totals[1]
-    node = tear(rings, s, i, place, fracture, time)
-    if node < 0:
-        rings.tough[i] = np.inf
-        return np.int64(-1)
-    rings.totals[1] += 1
-    rings.origin[fracture] = node
-    rings.first[fracture] = node
-    rings.last[fracture] = node
-    rings.reach[fracture] = rings.width[s]
-    rings.area[fracture] = 0.0
-    settle(rings, physics, s)
-    run_on(rings, physics, seed, crossings, fracture, _UP, time)
-    run_on(rings, physics, seed, crossings, fracture, _DOWN, time)
-    return fracture
-
-
-@njit
-def tear_all(rings: Any, physics: Any, seed: Any, crossings: Any, order: Any, time: Any) -> None:
-    """Let everything break that must, after the strips were stretched.
-
-    Fractures that are there run on first: their ends bear the most. Then strips break, the most
-    strained first (in nature fractures are not simultaneous, 3.2.3), and each fracture runs on
-    at once, so that it relieves its neighbours before their turn comes.
-    """
-    for f in range(rings.totals[1]):
-        rings.area[f] = 0.0
-    for s in range(len(rings.records)):
-        for i in range(rings.base[s], rings.base[s] + rings.records[s]):
-            if rings.tear[i] >= 0:
-                f = rings.tear_fracture[rings.tear[i]]
-                rings.area[f] += rings.open[i] * rings.width[s]
-    for f in range(rings.totals[1]):
-        if not physics.ends:
-            break
-        run_on(rings, physics, seed, crossings, f, _UP, time)
-        run_on(rings, physics, seed, crossings, f, _DOWN, time)
-    for s in order:
-        while True:
-            i = worst_piece(rings, physics, s)
-            if i < 0:
-                break
-            begin_fracture(rings, physics, seed, crossings, s, i, rings.weak[i], time)
+    """Let an end of a fracture tear the piece behind record k of strip `to`; whether it did."""
+    node, runs = _end_of(rings, fracture, upper)
+    new = tear(rings, to, k, place, fracture, time)
+    if new < 0:
+        return False
+    if runs > 0:
+        rings.tear_up[node] = new
+    else:
+        rings.tear_down[node] = new
+    if goes > 0:
+        rings.tear_down[new] = node
+    else:
+        rings.tear_up[new] = node
+    if upper:
+        rings.last[fracture] = new
+    else:
+        rings.first[fracture] = new
+    rings.reach[fracture] += rings.width[to]
+    rings.ran[fracture, upper] += rings.width[to]
+    settle(rings, physics, to)
+    return True

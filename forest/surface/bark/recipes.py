@@ -16,13 +16,15 @@ Colour = tuple[int, int, int]
 
 
 class Marks(Table):
-    """Spots scattered over the surface: lenticels, diamond scars, corky warts."""
+    """Spots scattered over the surface: lenticels, diamond scars, corky warts, eyes."""
 
     per_m2: float = quantity(..., "how many", unit="1/m2", ge=0, le=100_000)
     wide_mm: float = quantity(..., "mean size around the stem", unit="mm", gt=0, le=500)
     high_mm: float = quantity(..., "mean size along it", unit="mm", gt=0, le=500)
     spread: float = quantity(0.4, "standard deviation of the logarithm of sizes", ge=0, le=2)
-    shape: Literal["oval", "diamond"] = quantity("oval", "outline")
+    shape: Literal["oval", "diamond", "eye"] = quantity(
+        "oval", "outline; an eye is the scar of a branch below two drooping brows"
+    )
     depth_mm: float = quantity(
         0.0, "how deep they lie; below 0 they stand out", unit="mm", ge=-20, le=20
     )

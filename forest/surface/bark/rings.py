@@ -19,7 +19,7 @@ CHUNKS = 64  # of strips; fixed, so that results do not depend on the number of 
 
 
 class Rings(NamedTuple):
-    """Strips, records (76 bytes), tears (32) and fractures (28) as columns that kernels change."""
+    """Strips, records (76 bytes), tears (32) and fractures (52) as columns that kernels change."""
 
     # one row per strip
     axis: NDArray[np.int32]
@@ -65,6 +65,8 @@ class Rings(NamedTuple):
     last: NDArray[np.int32]
     reach: NDArray[np.float64]  # length along the axis, m
     area: NDArray[np.float64]  # m2
+    kept: NDArray[np.float64]  # of which was open at the start of the step
+    ran: NDArray[np.float64]  # (fractures, 2) by which the ends ran on in this step, m
     totals: NDArray[np.int64]  # (2) tears, fractures
 
 
@@ -215,23 +217,16 @@ def overload(rings: Any, s: Any, i: Any) -> Any:
 
 
 @njit
-def _stretch_chunk(
-    rings: Any, physics: Any, girth: Any, edges: Any, worst: Any, lo: Any, hi: Any
-) -> None:
+def _stretch_chunk(rings: Any, physics: Any, girth: Any, edges: Any, lo: Any, hi: Any) -> None:
     for s in range(lo, hi):
         _stretch(rings, physics, girth, edges, s)
-        worst[s] = 0.0
-        for i in range(rings.base[s], rings.base[s] + rings.records[s]):
-            worst[s] = max(worst[s], overload(rings, s, i))
 
 
 @driver
-def stretch_all(
-    first: Any, step: Any, rings: Any, physics: Any, girth: Any, edges: Any, worst: Any
-) -> None:
-    """Let the substrate grow below all strips; `worst` gets each strip's greatest overload."""
+def stretch_all(first: Any, step: Any, rings: Any, physics: Any, girth: Any, edges: Any) -> None:
+    """Let the substrate grow below all strips."""
     n = len(girth)
     for chunk in range(first, CHUNKS, step):
         lo = chunk * n // CHUNKS
         hi = (chunk + 1) * n // CHUNKS
-        _stretch_chunk(rings, physics, girth, edges, worst, lo, hi)
+        _stretch_chunk(rings, physics, girth, edges, lo, hi)

@@ -6,6 +6,7 @@ A tile repeats in both directions. Noise, fibres, flakes, scattered marks and mi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -158,6 +159,22 @@ def _flake(
     return pattern, height, gap
 
 
+def _eye(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
+    """Give how far from an eye's lines points are: a ringed oval, and brows that fall from it."""
+    oval = np.abs(np.hypot(x / 0.35, (y + 0.35) / 0.5) - 0.8) / 0.45
+    brow = np.abs(y - 0.75 + 1.3 * np.abs(x) ** 1.3) / 0.22
+    away: NDArray[Any] = np.minimum(oval, np.maximum(brow, np.abs(x) / 0.95))
+    return away
+
+
+#: How far points are from a mark's middle, or its lines, in shares of its size: 1 at its edge.
+_OUTLINES: dict[str, Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]]] = {
+    "oval": np.hypot,
+    "diamond": lambda x, y: np.abs(x) + np.abs(y),
+    "eye": _eye,
+}
+
+
 def _scatter(
     pixels: _Pixels, height: NDArray[Any], marks: Marks, size_m: float, seed: int, serial: int
 ) -> None:
@@ -175,7 +192,7 @@ def _scatter(
         columns = np.arange(np.floor(centre[0] - wide), np.ceil(centre[0] + wide) + 1)
         y = (rows - centre[1])[:, None] / max(high, 0.7)
         x = (columns - centre[0])[None, :] / max(wide, 0.7)
-        away = np.abs(x) + np.abs(y) if marks.shape == "diamond" else np.sqrt(x * x + y * y)
+        away = _OUTLINES[marks.shape](x, y)
         inside = np.clip((1.0 - away) / 0.35, 0.0, 1.0).astype(np.float32)
         where = np.ix_(rows.astype(np.int64) % n, columns.astype(np.int64) % n)
         ground = pixels[..., :3][where]

@@ -12,7 +12,7 @@ from forest.errors import InputError
 from forest.record.wood import YearlyWood
 from forest.surface.bark.axes import LEAST_RADIUS_M, BarkedTree, lay_strips
 from forest.surface.bark.checks import girths_from_birth
-from forest.surface.bark.cracks import Crack, Trigger, torn, triggers_of
+from forest.surface.bark.cracks import Crack, Missed, Trigger, torn, triggers_of
 from forest.surface.bark.dressing import Dress, Fold
 from forest.surface.bark.girth import (
     GirthHistory,
@@ -46,10 +46,11 @@ class _Stretch:
 
     `first` ends with the girth now, or what of it was there before plates tore again; `again`
     goes on from there. `before` rows precede the first time of the history. `triggers` are what is
-    torn by hand on the way, in order.
+    torn by hand on the way, in order; `thin` could not be torn, since no strip is there.
     """
 
     triggers: tuple[Trigger, ...] = ()
+    thin: tuple[Missed, ...] = ()
 
     def __init__(
         self, first: _Floats, again: _Floats | None, before: int, spread: _Floats | None
@@ -90,28 +91,31 @@ class _Stretch:
         again = shrinking(girth, whole, _STEPS) if whole.min() < 1.0 else None
         return cls(first, again, 0, None)
 
-    def grown(self, tree: BarkedTree, material: Material, seed: int, row: int) -> Bark:
-        """Grow bark up to a row of the history."""
+    def grown(
+        self, tree: BarkedTree, material: Material, seed: int, row: int
+    ) -> tuple[Bark, tuple[Missed, ...]]:
+        """Grow bark up to a row of the history; and the cracks for which it had no room."""
+        missed: list[Missed] = []
         rows = self.before + row + 1
         first = girths_from_birth(self.first, len(tree.geometry.axis))
         stops = self._stops(rows)
         begin = stops[0][0] if stops else rows
         spread = _steps(self.spread, 1, begin)
         bark = grow_bark(tree.geometry, first[:begin], material, seed, dilatation=spread)
-        bark = self._follow(bark, first, begin, rows, stops)
+        bark = self._follow(bark, first, begin, rows, stops, missed)
         if self.again is None:
-            return bark
+            return bark, tuple(missed)
         # Plates tear where the first fractures lie at the end, so that none of them moves.
         last = bark
         if rows < len(first):
             later = self._stops(len(first))[len(stops) :]
-            last = self._follow(bark, first, rows, len(first), later)
+            last = self._follow(bark, first, rows, len(first), later, [])
         # They begin at the first row: nothing grows in the step up to it.
         spread = _steps(self.spread, 1, rows)
         if spread is not None:
             spread = np.concatenate((np.ones((1, *spread.shape[1:])), spread))
         again = last.refracture(np.maximum(self.again[:rows], last.strips.girth), dilatation=spread)
-        return replace(again, surface=bark)
+        return replace(again, surface=bark), tuple(missed)
 
     def _stops(self, rows: int) -> list[tuple[int, Trigger]]:
         """List what is torn by hand on the way to a row, each with the rows that precede it.
@@ -128,13 +132,17 @@ class _Stretch:
         done: int,
         rows: int,
         stops: Sequence[tuple[int, Trigger]],
+        missed: list[Missed],
     ) -> Bark:
         """Let bark that has followed some rows follow those up to another, torn on the way."""
         for stop, trigger in stops:
             if stop > done:
                 bark = bark.grow(first[done:stop], dilatation=_steps(self.spread, done, stop))
                 done = stop
-            bark = torn(bark, trigger)
+            try:
+                bark = torn(bark, trigger)
+            except InputError:  # no room between the fractures that are there
+                missed.append(Missed(trigger.crack, "the bark was already torn there"))
         if rows > done:
             bark = bark.grow(first[done:rows], dilatation=_steps(self.spread, done, rows))
         return bark
@@ -175,6 +183,8 @@ class TreeBark:
     seed : int
     history : GirthHistory
         The girths up to this time.
+    missed : tuple of Missed
+        The cracks by hand that are not to be seen, and why.
     """
 
     tree: BarkedTree
@@ -182,6 +192,7 @@ class TreeBark:
     preset: Preset
     seed: int
     history: GirthHistory
+    missed: tuple[Missed, ...]
     _stretch: _Stretch
     _material: Material
 
@@ -380,6 +391,12 @@ def bark_tree(
         of_law = _Stretch.conserved(history) if law == "conserved" else None
         stretch = of_law or _Stretch.by_preset(history, preset)
     stretch.triggers = triggers_of(tree, history, cracks)
+    made = {trigger.crack for trigger in stretch.triggers}
+    stretch.thin = tuple(
+        Missed(crack, f"the stem is thinner than {least_radius_m:g} m of radius there")
+        for crack in cracks
+        if crack not in made
+    )
     if material is None:
         material = preset.material(float(np.nanmean(girth[tree.strips_of(tree.paths[0].axis)])))
     return _grown(tree, preset, seed, history, stretch, material, len(history.times) - 1)
@@ -394,8 +411,9 @@ def _grown(
     material: Material,
     row: int,
 ) -> TreeBark:
-    bark = stretch.grown(tree, material, seed, row)
+    bark, missed = stretch.grown(tree, material, seed, row)
     now = history.girth[-1]
     girth = bark.strips.girth
     sized = rescaled(bark, np.where(np.isnan(now), girth, now) / girth)
-    return TreeBark(tree, sized, preset, seed, history, stretch, material)
+    missed = (*stretch.thin, *missed)
+    return TreeBark(tree, sized, preset, seed, history, missed, stretch, material)

@@ -71,6 +71,8 @@ def whole_rings(
         last=np.zeros(tears, np.int32),
         reach=np.zeros(tears),
         area=np.zeros(tears),
+        kept=np.zeros(tears),
+        ran=np.zeros((tears, 2)),
         totals=np.zeros(2, np.int64),
     )
     physics = Physics.of(material)
