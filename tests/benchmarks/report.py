@@ -195,6 +195,11 @@ def _flow_lines(found: dict[str, Any]) -> Iterator[Line]:
         ("wound", f"ten years of a wound under {found['covering']:,} particles, s"),
     ):
         yield Line(what, tuple(f"{seconds:.2f}" for seconds in found[key]))
+    parted = f"{found['crown_parted']} of {found['crown_limbs'] - 1} limbs parted"
+    crown = f"an aspen's crown, {found['crown_steps']:,} steps of particles, {parted}, s"
+    yield Line(crown, tuple(f"{seconds:.2f}" for seconds in found["crown"]))
+    per_step = tuple(f"{1e6 * seconds / found['crown_steps']:.2f}" for seconds in found["crown"])
+    yield Line("the same, µs per step of a particle", per_step)
 
 
 def _bark_lines(cases: dict[str, Any]) -> Iterator[Line]:

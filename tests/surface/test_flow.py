@@ -9,11 +9,22 @@ from hypothesis import strategies as st
 
 from forest._threads import using_threads
 from forest.errors import InputError
+from forest.surface.blend.around import empty_around, gather, kin_of, value_around
 from forest.surface.blend.field import Blend
 from forest.surface.blend.limbs import limbs_of
 from forest.surface.flow import Flow, FlowRules, angle_to_limb, flow, grain
-from forest.surface.flow.chain import FLOWING, _push, empty_chain
+from forest.surface.flow.chain import (
+    DONE,
+    FLOWING,
+    _mend_links,
+    _push,
+    empty_chain,
+    grain_heading,
+    with_room,
+)
+from forest.surface.flow.laying import lay, start
 from forest.surface.flow.relink import relink
+from forest.surface.flow.surface import CLOSE, Seen, limbed, settle
 from tests.reference import flow as slow
 from tests.surface.limbs import Limb, branched, pole, tree
 
@@ -56,12 +67,13 @@ def test_relinking_is_table_2(n: int, limbs: int, seed: int, printed: bool) -> N
     ahead, behind = (np.arange(n) + 1) % n, (np.arange(n) - 1) % n
     links = {k: int(ahead[k]) for k in range(n)}
 
-    def goes_around(part: list[int], about: int) -> bool:
+    def goes_around(part: list[int]) -> bool:
         way = [place[k] for k in part]
-        return abs(slow.turns(way, foot[about], heading[about])) > 0.5
+        runs = [k for j, k in enumerate(part) if j == 0 or limb[k] != limb[part[j - 1]]]
+        return any(abs(slow.turns(way, foot[k], heading[k])) > 0.5 for k in runs)
 
     def allowed(one: list[int], other: list[int]) -> bool:
-        return printed or (goes_around(one, one[0]) and goes_around(other, other[0]))
+        return printed or (goes_around(one) and goes_around(other))
 
     for a in range(n):
         b = int(ahead[a])
@@ -103,6 +115,114 @@ def test_links_pull_like_springs_without_length() -> None:
             chain.place.tolist(), chain.velocity.tolist(), i, spring=100.0, damping=1.0
         )
         np.testing.assert_allclose(chain.push[i], expected, rtol=1e-12, atol=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), lean=st.floats(-80.0, 80.0))
+def test_steering_turns_particles_to_the_leaning_heading(seed: int, lean: float) -> None:
+    rng = np.random.default_rng(seed)
+    normal, heading = rng.normal(size=(2, 3))
+    normal /= np.linalg.norm(normal)
+    heading = normal.copy() if seed % 7 == 0 else heading / np.linalg.norm(heading)
+    way = slow.grain_heading(normal, heading, np.radians(lean))
+    got = grain_heading(normal, heading, np.cos(np.radians(lean)), np.sin(np.radians(lean)))
+    np.testing.assert_allclose(got, way, atol=1e-9)
+    chain = empty_chain(3)
+    chain.ahead[:], chain.behind[:] = (1, 2, 0), (2, 0, 1)
+    chain.velocity[:] = velocity = rng.normal(size=3)
+    chain.normal[:], chain.heading[:] = normal, heading
+    rules = FlowRules(skeleton_damping=0.0, steering=3.0, speed=1.5, spiral_deg=lean)
+    _push(chain, rules.forces(1.0), np.int64(0))
+    np.testing.assert_allclose(chain.push[0], 3.0 * (1.5 * np.array(way) - velocity), atol=1e-9)
+
+
+def test_particles_settle_where_the_slope_leads() -> None:
+    rng = np.random.default_rng(5)
+    blend = Blend.of(limbs_of(branched()))
+    surface, around = limbed(blend), empty_around(1)
+    for _ in range(8):
+        on = blend.project(rng.uniform((-0.1, -0.1, 0.1), (0.3, 0.1, 0.6)))[0]
+        normal = blend.gradient(on)[0]
+        normal /= np.linalg.norm(normal)
+        x = on + rng.normal(0.0, 0.003, 3)
+        hint = np.int64(blend.limb(on).cone[0])
+        gather(blend.kernel, surface.kin, around, 0, 0, *x.tolist(), 0.1)
+        got = settle(Seen(surface.field, surface.kin, around, 0), *x.tolist(), hint, normal)
+        place, way = slow.settle(lambda p: slow.seen(blend, {0, 1}, p)[0], x.tolist())
+        assert abs(slow.seen(blend, {0, 1}, got[:3])[0]) <= CLOSE * 0.1
+        assert np.linalg.norm(np.subtract(got[:3], place)) < 0.1 * np.linalg.norm(x - on)
+        assert np.dot(got[3:6], way) > 0.999
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(3, 20), wide=st.sampled_from([0.004, 1.0]))
+def test_links_are_split_and_merged_one_by_one(seed: int, n: int, wide: float) -> None:
+    """On a flat side of a trunk as thick as can be, particles stay in their links' middles."""
+    rng = np.random.default_rng(seed)
+    radius = 1e4
+    surface = limbed(Blend.of(limbs_of(pole(radius, 3e4))))
+    forces = FlowRules(steering=0.0).forces(1.0)
+    chain = empty_chain(3 * n)
+    turn = np.sort(rng.uniform(0.0, 2.0 * np.pi, n))
+    size = wide * rng.uniform(0.1, 0.4)
+    chain.place[:n] = (radius, 0.0, 1e4)
+    chain.place[:n, 1:] += size * np.column_stack((np.cos(turn), np.sin(turn)))
+    chain.velocity[:n, 1:] = rng.normal(size=(n, 2))
+    chain.normal[:n] = (1.0, 0.0, 0.0)
+    chain.radius[:n] = radius
+    chain.state[:n] = np.where(rng.random(n) < 0.2, DONE, FLOWING)
+    chain.velocity[:n][chain.state[:n] == DONE] = 0.0
+    chain.ahead[:n], chain.behind[:n] = (np.arange(n) + 1) % n, (np.arange(n) - 1) % n
+    chain.live[:n], chain.tally[:2] = np.arange(n), n
+    beads = {
+        k: slow.Bead(chain.place[k].tolist(), chain.velocity[k].tolist(), chain.state[k] == DONE)
+        for k in range(n)
+    }
+    loop, after = slow.mend(list(range(n)), beads, forces.least, forces.greatest)
+    _mend_links(surface, chain, forces)
+    assert sorted(chain.live[: chain.tally[1]].tolist()) == sorted(loop)
+    assert [int(chain.ahead[k]) for k in loop] == loop[1:] + loop[:1]
+    assert [int(chain.behind[k]) for k in loop] == loop[-1:] + loop[:-1]
+    for k in loop:
+        np.testing.assert_allclose(chain.place[k, 1:], after[k].place[1:], atol=1e-3 * wide)
+        np.testing.assert_allclose(chain.velocity[k, 1:], after[k].velocity[1:], atol=1e-3)
+        assert (chain.state[k] == DONE) == after[k].done
+
+
+def _hub() -> Blend:
+    """Seven limbs that leave a trunk at one height, some of them side by side."""
+    shapes = [Limb(-1, 0, (0, 0, 0), (0, 0, 0.8), 0.06, 0.04)]
+    for k in range(7):
+        around, lean = 0.6 * k, np.radians(35.0 + 8.0 * (k % 3))
+        way = np.array([np.sin(lean) * np.cos(around), np.sin(lean) * np.sin(around), np.cos(lean)])
+        base = np.array([0.0, 0.0, 0.3 + 0.01 * (k % 2)])
+        shapes.append(Limb(0, 2, base, base + 0.4 * way, 0.035, 0.02))
+    return Blend.of(limbs_of(tree(*shapes)))
+
+
+def test_every_limb_of_a_hub_has_a_ring() -> None:
+    """The chain hangs between limbs side by side; rings laid past the place go on."""
+    blend = _hub()
+    found = flow(blend)
+    assert found.stuck == 0
+    assert found.laid > 0
+    last = found.chains[-1]
+    on = [set(part.tolist()) for part in np.split(last.limb, last.first[1:-1])]
+    assert set(range(8)) <= {min(part) for part in on if len(part) == 1}
+
+
+def test_a_ring_is_laid_where_the_limb_is_alone() -> None:
+    surface = limbed(_hub())
+    forces = FlowRules().forces(0.06)
+    chain = with_room(start(surface, forces), 5000)
+    first = int(chain.tally[0])
+    chain = lay(surface, chain, forces, 3, 0.0)
+    new = np.arange(first, chain.tally[0])
+    assert len(new) >= 6 and (chain.limb[new] == 3).all()
+    assert np.abs(np.linalg.norm(chain.place[new] - chain.foot[new], axis=1) / 0.035).max() < 1.2
+    before = chain.tally.copy()
+    chain = lay(surface, chain, forces, 3, 0.39)  # at the tip no ring has room
+    assert np.array_equal(chain.tally, before)
 
 
 @pytest.mark.parametrize("rules", [PRINTED, FlowRules()], ids=["printed", "steered"])
@@ -163,6 +283,52 @@ def test_links_stay_between_their_limits(junction: tuple[Blend, Flow]) -> None:
             assert link.max() < 0.15 + 1e-9
             if len(part) > 6:
                 assert np.median(link) > 0.05
+
+
+def _crossing() -> Blend:
+    """Two limbs of one trunk, from far apart, that cross."""
+    return Blend.of(
+        limbs_of(
+            tree(
+                Limb(-1, 0, (0, 0, 0), (0, 0, 2.4), 0.1, 0.08),
+                Limb(0, 0, (0, 0, 0.3), (0.9, 0.0, 1.2), 0.04, 0.03),
+                Limb(0, 5, (0, 0, 1.8), (0.9, 0.02, 0.9), 0.04, 0.03),
+            )
+        )
+    )
+
+
+def test_limbs_that_cross_do_not_hold_the_chain() -> None:
+    blend = _crossing()
+    found = flow(blend)
+    assert found.relinked == 2
+    assert found.stuck == 0
+    place = found.trails.place
+    assert blend.value(place).min() > -0.0102 * 0.1  # no trail within the other's wood
+    last = found.chains[-1]
+    on = [set(part.tolist()) for part in np.split(last.limb, last.first[1:-1])]
+    assert sorted(on, key=min) == [{0}, {1}, {2}]
+
+
+def test_lists_give_the_surface_that_a_limb_sees() -> None:
+    rng = np.random.default_rng(8)
+    blend = _crossing()
+    kin = kin_of(blend.limbs)
+    pairs = [set(kin.other[kin.first[k] : kin.first[k + 1]].tolist()) for k in range(3)]
+    assert pairs == [{1, 2}, {0}, {0}]
+    around = empty_around(1)
+    cones = blend.limbs.cones
+    for _ in range(300):
+        k = int(rng.integers(len(cones.axis)))
+        axis = cones.axis[k]
+        middle = cones.start[k] + rng.random() * (cones.end[k] - cones.start[k])
+        middle = middle + rng.normal(0.0, 0.06, 3)
+        gather(blend.kernel, kin, around, 0, axis, *middle.tolist(), 0.05)
+        for _ in range(3):
+            x = (middle + rng.normal(0.0, 0.04, 3)).tolist()
+            got, which = value_around(blend.kernel, kin, around, 0, *x, k)
+            expected, nearest = slow.seen(blend, {int(axis)} | pairs[axis], x)
+            assert (got, which) == (expected, nearest)
 
 
 def test_grain_follows_the_branches(junction: tuple[Blend, Flow]) -> None:

@@ -255,9 +255,8 @@ def gradient(field: Any, x: Any, y: Any, z: Any, hint: Any) -> Any:
 
 
 @njit
-def slope(field: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
-    """The function's slope (3): the nearest cone's where that alone makes f, else differences."""
-    cones = field.cones
+def slope_alone(cones: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
+    """The slope (3) of a cone, and before it whether that alone makes the function's value f."""
     ax, ay, az = cones.start[i, 0], cones.start[i, 1], cones.start[i, 2]
     lx, ly, lz = cones.end[i, 0] - ax, cones.end[i, 1] - ay, cones.end[i, 2] - az
     square = lx * lx + ly * ly + lz * lz
@@ -267,12 +266,20 @@ def slope(field: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
     d = np.sqrt(dx * dx + dy * dy + dz * dz)
     change = cones.high[i] - cones.low[i]
     if abs(d - cones.low[i] - s * change - f) > 1e-12 or d <= _TINY:
+        return False, 0.0, 0.0, 0.0
+    taper = change / square if s == t else 0.0
+    return True, dx / d - taper * lx, dy / d - taper * ly, dz / d - taper * lz
+
+
+@njit
+def slope(field: Any, x: Any, y: Any, z: Any, f: Any, i: Any) -> Any:
+    """The function's slope (3): the nearest cone's where that alone makes f, else differences."""
+    alone, gx, gy, gz = slope_alone(field.cones, x, y, z, f, i)
+    if not alone:
         gx = (value(field, x + _STEP, y, z, i)[0] - f) / _STEP
         gy = (value(field, x, y + _STEP, z, i)[0] - f) / _STEP
         gz = (value(field, x, y, z + _STEP, i)[0] - f) / _STEP
-        return gx, gy, gz
-    taper = change / square if s == t else 0.0
-    return dx / d - taper * lx, dy / d - taper * ly, dz / d - taper * lz
+    return gx, gy, gz
 
 
 @njit

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
-from forest.surface.flow.relink import relink
-from forest.surface.flow.surface import foot, settle
+from forest.surface.blend.around import Around, empty_around, gather
+from forest.surface.flow.relink import apart, relink
+from forest.surface.flow.surface import Seen, foot, settle
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -23,6 +24,8 @@ FLOWING = 1
 DONE = 2  # at a tip
 #: Fewest particles of a loop.
 LEAST_LOOP = 3
+#: How far around a particle its lists reach, in longest links, and when they are gathered anew.
+_REACH, _WORN = 1.0, 0.75
 
 
 class Forces(NamedTuple):
@@ -62,6 +65,7 @@ class Chain(NamedTuple):
     push: _Floats  # (n, 3) scratch
     live: _Ints  # (n,) numbers of those that are not gone
     tally: _Ints  # (3,) particles ever, live ones, relinkings
+    around: Around  # what of the surface is near each
 
 
 def empty_chain(room: int) -> Chain:
@@ -84,21 +88,36 @@ def empty_chain(room: int) -> Chain:
         push=np.zeros((room, 3)),
         live=ints[4],
         tally=np.zeros(3, np.int64),
+        around=empty_around(room),
     )
 
 
 def with_room(chain: Chain, room: int) -> Chain:
     """Copy a chain into longer arrays."""
     longer = empty_chain(room)
-    for name, old in chain._asdict().items():
-        getattr(longer, name)[: len(old)] = old
+    old: list[NDArray[Any]] = [*chain[:-1], *chain.around]
+    new: list[NDArray[Any]] = [*longer[:-1], *longer.around]
+    for before, after in zip(old, new, strict=True):
+        after[: len(before)] = before
     return longer
 
 
 @njit
-def put(surface: Any, chain: Any, i: Any, x: Any, y: Any, z: Any) -> None:
+def _look_around(surface: Any, chain: Any, i: Any, reach: Any, x: Any, y: Any, z: Any) -> None:
+    """Gather what is near a particle if it has left the middle of its lists, or its limb."""
+    middle = chain.around.middle[i]
+    square = (x - middle[0]) ** 2 + (y - middle[1]) ** 2 + (z - middle[2]) ** 2
+    axis = chain.limb[i]
+    if square > (_WORN * reach) ** 2 or chain.around.axis[i] != axis:
+        gather(surface.field, surface.kin, chain.around, i, axis, x, y, z, reach)
+
+
+@njit
+def put(surface: Any, chain: Any, forces: Any, i: Any, x: Any, y: Any, z: Any) -> None:
     """Put a particle on the surface; its velocity keeps what is tangential."""
-    x, y, z, nx, ny, nz, off, which = settle(surface.field, x, y, z, chain.cone[i], chain.normal[i])
+    _look_around(surface, chain, i, _REACH * forces.greatest, x, y, z)
+    seen = Seen(surface.field, surface.kin, chain.around, i)
+    x, y, z, nx, ny, nz, off, which = settle(seen, x, y, z, chain.cone[i], chain.normal[i])
     v = chain.velocity[i]
     across = v[0] * nx + v[1] * ny + v[2] * nz
     v[0] -= across * nx
@@ -172,11 +191,11 @@ def _move(surface: Any, chain: Any, forces: Any) -> None:
         x = chain.place[i, 0] + forces.step * chain.velocity[i, 0]
         y = chain.place[i, 1] + forces.step * chain.velocity[i, 1]
         z = chain.place[i, 2] + forces.step * chain.velocity[i, 2]
-        put(surface, chain, i, x, y, z)
+        put(surface, chain, forces, i, x, y, z)
 
 
 @njit
-def _put_between(surface: Any, chain: Any, a: Any, b: Any) -> None:
+def _put_between(surface: Any, chain: Any, forces: Any, a: Any, b: Any) -> None:
     """Put a new particle into the middle of a link."""
     m = chain.tally[0]
     chain.tally[0] += 1
@@ -184,6 +203,7 @@ def _put_between(surface: Any, chain: Any, a: Any, b: Any) -> None:
     chain.tally[1] += 1
     chain.state[m] = FLOWING
     chain.cone[m] = chain.cone[a]
+    chain.limb[m] = chain.limb[a]
     chain.mother[m] = a
     for k in range(3):
         chain.velocity[m, k] = 0.5 * (chain.velocity[a, k] + chain.velocity[b, k])
@@ -191,7 +211,7 @@ def _put_between(surface: Any, chain: Any, a: Any, b: Any) -> None:
     x = 0.5 * (chain.place[a, 0] + chain.place[b, 0])
     y = 0.5 * (chain.place[a, 1] + chain.place[b, 1])
     z = 0.5 * (chain.place[a, 2] + chain.place[b, 2])
-    put(surface, chain, m, x, y, z)
+    put(surface, chain, forces, m, x, y, z)
     chain.ahead[a] = chain.behind[b] = m
     chain.behind[m], chain.ahead[m] = a, b
 
@@ -229,11 +249,15 @@ def _mend_links(surface: Any, chain: Any, forces: Any) -> None:
             square += (chain.place[a, k] - chain.place[b, k]) ** 2
         finer = min(1.0, forces.finest * min(chain.radius[a], chain.radius[b]) / forces.greatest)
         if square > (finer * forces.greatest) ** 2:
-            _put_between(surface, chain, a, b)
+            _put_between(surface, chain, forces, a, b)
         elif square < (finer * forces.least) ** 2:
-            third = chain.ahead[chain.ahead[b]]
-            if third != a and chain.ahead[b] != a:  # more than LEAST_LOOP
+            third = chain.ahead[b]
+            if chain.ahead[third] != a and third != a:  # more than LEAST_LOOP
                 _take_out(chain, min(a, b), max(a, b))
+            elif apart(chain.place, third, a) < (finer * forces.least) ** 2:
+                for i in (a, b, third):  # nothing is left within the loop
+                    chain.state[i] = DONE
+                    chain.velocity[i] = 0.0
     kept = 0
     for j in range(chain.tally[1]):
         if chain.state[chain.live[j]] != GONE:

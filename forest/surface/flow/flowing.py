@@ -14,14 +14,13 @@ from forest.surface.blend.whole import READINGS
 from forest.surface.flow.chain import (
     DONE,
     FLOWING,
+    LEAST_LOOP,
     Chain,
     Forces,
     advance,
-    empty_chain,
-    grain_heading,
-    put,
     with_room,
 )
+from forest.surface.flow.laying import Rings, start
 from forest.surface.flow.surface import Limbed, limbed
 from forest.surface.flow.trails import Trails
 
@@ -32,8 +31,11 @@ _Ints = NDArray[np.int64]
 RECORD_EVERY = 5
 #: The chain is stuck when it moves slower than this share of the speed at which it started.
 _STUCK = 0.02
-#: Height of the ring at the start above the ground, units.
-_START = 0.1
+#: The flow ends when it takes so many times as long as straight to the farthest tip, or so many
+#: times the steps of particles that rings about all limbs would: then chains hang in crotches.
+_PATIENCE, _EFFORT = 8.0, 3.0
+#: Points of trails so far within the wood, in radii of the limb, lie where limbs cross.
+_WITHIN = 0.01
 
 
 @dataclass(frozen=True)
@@ -176,6 +178,8 @@ class Flow:
         Length of one unit of the paper, m.
     relinked : int
         How often the chain was relinked.
+    laid : int
+        Rings laid anew on limbs past places where the chain hung, and on those it had not reached.
     stuck : int
         Particles that did not come to a tip.
     chains : list of Loops
@@ -185,58 +189,9 @@ class Flow:
     trails: Trails
     unit_m: float
     relinked: int
+    laid: int
     stuck: int
     chains: list[Loops]
-
-
-def _start(surface: Limbed, rules: FlowRules, unit: float) -> Chain:
-    """Lay a ring of particles around the foot of each stem."""
-    cones = surface.field.cones
-    feet = np.flatnonzero(np.isfinite(cones.ground[cones.axis]) & (cones.along == 0.0))
-    feet = feet if len(feet) else np.zeros(1, np.int64)
-    radius = cones.low[feet] + cones.flare[cones.axis[feet], 1]
-    mean = 0.5 * (rules.greatest_link + rules.least_link) * unit
-    sizes = [max(6, math.ceil(2.0 * math.pi * r / mean)) for r in radius]
-    chain = empty_chain(16 * sum(sizes))
-    first = 0
-    for foot, r, n in zip(feet.tolist(), radius.tolist(), sizes, strict=True):
-        _lay_ring(surface, chain, rules, unit, foot, r, first, n)
-        first += n
-    chain.tally[:2] = first
-    return chain
-
-
-def _lay_ring(
-    surface: Limbed,
-    chain: Chain,
-    rules: FlowRules,
-    unit: float,
-    foot: int,
-    radius: float,
-    first: int,
-    n: int,
-) -> None:
-    """Put particles `first` to `first + n` around the lower end of a cone, linked in a ring."""
-    cones = surface.field.cones
-    line = cones.end[foot] - cones.start[foot]
-    line /= np.linalg.norm(line)
-    side = np.cross(line, np.eye(3)[int(np.argmin(np.abs(line)))])
-    side /= np.linalg.norm(side)
-    other = np.cross(line, side)
-    base = cones.start[foot] + _START * unit * line
-    lean = math.radians(rules.spiral_deg)
-    for k in range(n):
-        i = first + k
-        turn = 2.0 * math.pi * k / n
-        x, y, z = base + radius * (math.cos(turn) * side + math.sin(turn) * other)
-        chain.cone[i] = foot
-        chain.state[i] = FLOWING
-        put(surface, chain, np.int64(i), float(x), float(y), float(z))
-        way = grain_heading(chain.normal[i], line, math.cos(lean), math.sin(lean))
-        chain.velocity[i] = rules.speed * unit * np.array(way)
-        chain.ahead[i], chain.behind[i] = first + (k + 1) % n, first + (k - 1) % n
-        chain.live[i] = i
-        chain.mother[i] = -1
 
 
 def _loops(chain: Chain, time_s: float) -> Loops:
@@ -254,6 +209,17 @@ def _loops(chain: Chain, time_s: float) -> Loops:
             k = int(chain.ahead[k])
         first.append(len(order))
     return Loops(time_s, chain.place[order].copy(), chain.limb[order].copy(), np.array(first))
+
+
+def _effort(surface: Limbed, rules: FlowRules, unit: float) -> float:
+    """Count the steps of particles that a ring about each limb takes from its base to its tip."""
+    cones = surface.field.cones
+    length = np.linalg.norm(cones.end - cones.start, axis=1)
+    radius = 0.5 * (cones.low + cones.high)
+    finer = np.minimum(1.0, rules.finest_link * radius / (rules.greatest_link * unit))
+    link = 0.5 * (rules.greatest_link + rules.least_link) * unit * finer
+    steps = length * rules.steps_per_s / (rules.speed * unit)
+    return float(np.sum(steps * np.maximum(LEAST_LOOP, 2.0 * math.pi * radius / link)))
 
 
 def flow(
@@ -303,21 +269,28 @@ def flow(
         if value is not None and not 0.0 < value < math.inf:
             raise InputError(f"{value:g}", where=name, expected="a finite number above 0")
     forces = rules.forces(unit)
-    chain = _start(surface, rules, unit)
-    far = float(np.linalg.norm(cones.end - cones.start, axis=1).sum())
-    longest = 4.0 * far / (rules.speed * unit) if seconds is None else seconds
+    chain = start(surface, forces)
+    far = float(np.linalg.norm(cones.end - cones.start[0], axis=1).max())
+    longest = _PATIENCE * far / (rules.speed * unit) if seconds is None else seconds
+    rings = Rings(surface, chain, forces) if rules.steering > 0.0 else None
     trails = _Recorder()
     shown = [_loops(chain, 0.0)]
     trails.take(chain, 0.0)
     done, next_show = 0, show_every_s
-    while done < longest * rules.steps_per_s:
+    bounded = seconds is None and rules.steering > 0.0  # momentum alone takes its time
+    effort = _EFFORT * _effort(surface, rules, unit) if bounded else math.inf
+    while done < longest * rules.steps_per_s and effort > 0.0:
         taken, flowing = advance(surface, chain, forces, np.int64(RECORD_EVERY))
         done += taken
+        effort -= taken * flowing
         if taken < RECORD_EVERY and flowing:
             chain = with_room(chain, 2 * len(chain.live))
             continue
         time_s = done * forces.step
         trails.take(chain, time_s)
+        if rings is not None:
+            chain = rings.tend(chain, done, flowing)
+            flowing = flowing or rings.fresh
         if time_s >= next_show or not flowing:
             shown.append(_loops(chain, time_s))
             next_show += show_every_s
@@ -325,9 +298,10 @@ def flow(
                 break
     live = chain.live[: chain.tally[1]]
     return Flow(
-        trails=trails.trails(chain),
+        trails=trails.trails(chain, blend),
         unit_m=unit,
         relinked=int(chain.tally[2]),
+        laid=rings.laid if rings is not None else 0,
         stuck=int(np.count_nonzero(chain.state[live] != DONE)),
         chains=shown,
     )
@@ -348,6 +322,7 @@ class _Recorder:
         self._place: list[_Floats] = []
         self._limb: list[NDArray[np.int32]] = []
         self._off: list[_Floats] = []
+        self._radius: list[_Floats] = []
         self._time: list[float] = []
         self._ended = np.zeros(0, np.bool_)
 
@@ -363,16 +338,21 @@ class _Recorder:
         self._place.append(chain.place[live])
         self._limb.append(chain.limb[live])
         self._off.append(chain.off[live])
+        self._radius.append(chain.radius[live])
         self._time.append(time_s)
 
-    def trails(self, chain: Chain) -> Trails:
+    def trails(self, chain: Chain, blend: Blend) -> Trails:
         number = np.concatenate(self._number)
         time = np.repeat(self._time, [len(part) for part in self._number])
         order = np.argsort(number, kind="stable")  # by particle, then by time
+        place = np.concatenate(self._place)[order]
+        radius = np.concatenate(self._radius)[order]
+        outside = blend.value(place) >= -_WITHIN * radius
+        place, order = place[outside], order[outside]
         number = number[order]
         names, first = np.unique(number, return_index=True)
         return Trails(
-            place=np.concatenate(self._place)[order],
+            place=place,
             time_s=time[order],
             limb=np.concatenate(self._limb)[order],
             off_m=np.concatenate(self._off)[order],

@@ -37,12 +37,25 @@ def winding(
 
 
 @njit
-def _encloses(place: Any, ahead: Any, foot: Any, heading: Any, first: Any, last: Any) -> Any:
-    return abs(winding(place, ahead, foot, heading, first, first, last)) > np.pi
+def _goes_around(
+    limb: Any, place: Any, ahead: Any, foot: Any, heading: Any, first: Any, last: Any
+) -> Any:
+    """Whether the part first .. last, closed, turns about a limb that it is on."""
+    about = first
+    while True:
+        turn = winding(place, ahead, foot, heading, about, first, last)
+        if abs(turn) > np.pi:
+            return True
+        on = limb[about]
+        while limb[about] == on:
+            if about == last:
+                return False
+            about = ahead[about]
 
 
 @njit
-def _apart(place: Any, a: Any, b: Any) -> Any:
+def apart(place: Any, a: Any, b: Any) -> Any:
+    """Squared distance of two particles."""
     x = place[a, 0] - place[b, 0]
     y = place[a, 1] - place[b, 1]
     z = place[a, 2] - place[b, 2]
@@ -63,8 +76,8 @@ def relink(
 ) -> Any:
     """Part the chain that runs from a to b = ahead[a], as Table 2 lists it.
 
-    As printed, a single particle that steps on a limb would become a loop of its own. So both
-    parts must also go around the limb that they are on (not if `printed`).
+    As printed, a single particle that steps on a limb would become a loop of its own. So either
+    part must also go around a limb that it is on (not if `printed`).
 
     Returns
     -------
@@ -80,11 +93,11 @@ def relink(
             b = ahead[b]
             if b == a0:
                 return relinked
-            if limb[a] != limb[b] and _apart(place, b0, a) < _apart(place, b, a):
+            if limb[a] != limb[b] and apart(place, b0, a) < apart(place, b, a):
                 if printed:
                     break
-                one = _encloses(place, ahead, foot, heading, b0, a)
-                if one and _encloses(place, ahead, foot, heading, b, a0):
+                one = _goes_around(limb, place, ahead, foot, heading, b0, a)
+                if one and _goes_around(limb, place, ahead, foot, heading, b, a0):
                     break
         relinked += 1
         ahead[a] = b0

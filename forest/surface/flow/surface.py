@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forest._jit import njit
-from forest.surface.blend.field import Blend, cone, value
+from forest.surface.blend.around import Around, Kin, kin_of, value_around
+from forest.surface.blend.field import Blend, cone, slope_alone
 
 _Floats = NDArray[np.float64]
 
@@ -39,7 +40,17 @@ class Limbed(NamedTuple):
     """What a kernel needs of a surface with limbs."""
 
     field: Any  # of `forest.surface.blend.field`
+    kin: Kin
     free: NDArray[np.bool_]  # (axes,) whether the axis ends in a tip, not in a fork
+
+
+class Seen(NamedTuple):
+    """The surface as one particle sees it (`blend.around`)."""
+
+    field: Any
+    kin: Kin
+    around: Around
+    number: Any
 
 
 def limbed(blend: Blend) -> Limbed:
@@ -55,23 +66,29 @@ def limbed(blend: Blend) -> Limbed:
         away = np.linalg.norm(cones.start[first] - cones.end[end], axis=1)
         away[k] = np.inf
         free[cones.axis[end]] = away.min() > 1.5 * cones.high[end]
-    return Limbed(blend.kernel, free)
+    return Limbed(blend.kernel, kin_of(blend.limbs), free)
 
 
 @njit
-def _along_ray(field: Any, x: Any, y: Any, z: Any, which: Any) -> Any:
+def _value(on: Any, x: Any, y: Any, z: Any, which: Any) -> Any:
+    """The implicit function as a particle sees it, and the cone nearest there."""
+    return value_around(on.field, on.kin, on.around, on.number, x, y, z, which)
+
+
+@njit
+def _along_ray(on: Any, x: Any, y: Any, z: Any, which: Any) -> Any:
     """Find the surface on the ray from the limb's axis through a point, by halving."""
-    _, r, fx, fy, fz, _ = cone(field.cones, which, x, y, z)
+    _, r, fx, fy, fz, _ = cone(on.field.cones, which, x, y, z)
     dx, dy, dz = x - fx, y - fy, z - fz
     size = max(np.sqrt(dx * dx + dy * dy + dz * dz), 1e-12)
     dx, dy, dz = dx / size, dy / size, dz / size
     inside, outside = 0.0, size
-    while value(field, fx + outside * dx, fy + outside * dy, fz + outside * dz, which)[0] < 0.0:
+    while _value(on, fx + outside * dx, fy + outside * dy, fz + outside * dz, which)[0] < 0.0:
         inside = outside
         outside += 0.25 * r
     for _ in range(_HALVINGS):
         middle = 0.5 * (inside + outside)
-        if value(field, fx + middle * dx, fy + middle * dy, fz + middle * dz, which)[0] < 0.0:
+        if _value(on, fx + middle * dx, fy + middle * dy, fz + middle * dz, which)[0] < 0.0:
             inside = middle
         else:
             outside = middle
@@ -79,16 +96,18 @@ def _along_ray(field: Any, x: Any, y: Any, z: Any, which: Any) -> Any:
 
 
 @njit
-def _slope(field: Any, x: Any, y: Any, z: Any, f: Any, which: Any) -> Any:
-    """Give the function's slope by differences ahead of a point whose value is known."""
-    gx = value(field, x + _STEP, y, z, which)[0] - f
-    gy = value(field, x, y + _STEP, z, which)[0] - f
-    gz = value(field, x, y, z + _STEP, which)[0] - f
-    return gx / _STEP, gy / _STEP, gz / _STEP
+def _slope(on: Any, x: Any, y: Any, z: Any, f: Any, which: Any) -> Any:
+    """Give the slope at a point whose value is known: a cone's own, or by differences ahead."""
+    alone, gx, gy, gz = slope_alone(on.field.cones, x, y, z, f, which)
+    if not alone:
+        gx = (_value(on, x + _STEP, y, z, which)[0] - f) / _STEP
+        gy = (_value(on, x, y + _STEP, z, which)[0] - f) / _STEP
+        gz = (_value(on, x, y, z + _STEP, which)[0] - f) / _STEP
+    return gx, gy, gz
 
 
 @njit
-def settle(field: Any, x: Any, y: Any, z: Any, hint: Any, normal: Any) -> Any:
+def settle(on: Any, x: Any, y: Any, z: Any, hint: Any, normal: Any) -> Any:
     """Move a point onto the surface by Newton steps along the slope.
 
     The first step is along `normal`, that of the place which the point comes from. The slope is
@@ -99,13 +118,14 @@ def settle(field: Any, x: Any, y: Any, z: Any, hint: Any, normal: Any) -> Any:
     tuple
         The place (3), the unit normal there (3), how far it still is off, and its cone.
     """
-    f, which = value(field, x, y, z, hint)
+    cones = on.field.cones
+    f, which = _value(on, x, y, z, hint)
     gx, gy, gz = normal[0], normal[1], normal[2]
     stale = gx * gx + gy * gy + gz * gz < 0.5
     for _ in range(_NEWTON_STEPS):
-        close = CLOSE * min(field.cones.low[which], field.cones.high[which])
+        close = CLOSE * min(cones.low[which], cones.high[which])
         if stale or abs(f) <= close:
-            gx, gy, gz = _slope(field, x, y, z, f, which)
+            gx, gy, gz = _slope(on, x, y, z, f, which)
         square = max(gx * gx + gy * gy + gz * gz, _FLATTEST * _FLATTEST)
         if abs(f) <= close * min(np.sqrt(square), 1.0):  # a normal's slope is 1, a blend's less
             off = f
@@ -113,15 +133,15 @@ def settle(field: Any, x: Any, y: Any, z: Any, hint: Any, normal: Any) -> Any:
         step = f / square
         x, y, z = x - step * gx, y - step * gy, z - step * gz
         before = abs(f)
-        f, which = value(field, x, y, z, which)
+        f, which = _value(on, x, y, z, which)
         stale = abs(f) > 0.25 * before
     else:  # a crease: slopes lead from one side to the other
-        x, y, z, off = _along_ray(field, x, y, z, which)
-        f, which = value(field, x, y, z, which)
+        x, y, z, off = _along_ray(on, x, y, z, which)
+        f, which = _value(on, x, y, z, which)
         off = min(abs(f), off)  # where the function jumps, the surface is in the jump
-        gx, gy, gz = _slope(field, x, y, z, f, which)
+        gx, gy, gz = _slope(on, x, y, z, f, which)
     if gx * gx + gy * gy + gz * gz > _STEEPEST * _STEEPEST:
-        _, _, fx, fy, fz, _ = cone(field.cones, which, x, y, z)
+        _, _, fx, fy, fz, _ = cone(cones, which, x, y, z)
         gx, gy, gz = x - fx, y - fy, z - fz
     size = max(np.sqrt(gx * gx + gy * gy + gz * gz), 1e-12)
     return x, y, z, gx / size, gy / size, gz / size, off, which
