@@ -36,8 +36,8 @@ _Floats = NDArray[np.float64]
 LAWS = ("preset", "conserved")
 _STEPS = 20  # of shrinking
 _STEPS_BEFORE = 12  # in which what had torn before the first year on record tears
-_MOST_ROWS = 8192  # of a map of given columns; more no browser may take
-_MOST_PIXELS = 2**23
+_MOST_ROWS = 4096  # of a map of given columns; more no browser may take
+_MOST_PIXELS = 2**22
 _FOLD = 0.35  # height of a fold, in radii of the branch
 _MOST_FOLD_M = 0.015
 _FOLD_OF_STEM = 0.06  # nor more than this part of the radius of what bears the branch
@@ -258,8 +258,8 @@ class TreeBark:
         size : int or (columns, rows)
             Pixels around and along. With one number it is that around the trunk's foot. Thinner
             axes have fewer, and the rows follow the length, so that all pixels are about as large
-            and square: both are powers of two, by rounding. A map has 8192
-            rows and 2^23 pixels at most (but as many rows as `size` in any case); pixels of long
+            and square: both are powers of two, by rounding. A map has 4096
+            rows and 2^22 pixels at most (but as many rows as `size` in any case); pixels of long
             axes are therefore taller than wide.
         axes : tuple of int, optional
             Which axes; all unless given.
