@@ -309,7 +309,7 @@ class TreeBark:
 
 
 def _power(pixels: float) -> int:
-    return int(2 ** max(np.round(np.log2(max(pixels, 1.0))), 6))
+    return int(2 ** max(round(float(np.log2(max(pixels, 1.0)))), 6))
 
 
 def bark_tree(
