@@ -56,7 +56,7 @@ class _Queue(NamedTuple):
     not), by what + the number of strips. What waits otherwise was put in anew since.
     """
 
-    waiting: list[tuple[float, int]]
+    waiting: list[tuple[float, np.int64]]
     due: NDArray[np.float64]
     held: NDArray[np.bool_]  # ends held by their width or run
     order: NDArray[np.int64]  # passages by the strip they lead to
