@@ -8,7 +8,7 @@ import pytest
 from forest.errors import InputError
 from forest.surface.bark import Bark
 from forest.surface.bark.dressing import grow_preset
-from forest.surface.bark.geometry import MATERIALS, bark_geometry, cylinder, flat
+from forest.surface.bark.geometry import MATERIALS, _uncrossed, bark_geometry, cylinder, flat
 from forest.surface.bark.presets import Preset
 
 
@@ -69,3 +69,9 @@ def test_a_piece_can_be_cut_out(oak: tuple[Preset, Bark]) -> None:
     np.testing.assert_allclose([low[0], high[0], low[2], high[2]], [0.1, 0.3, 0.1, 0.25])
     with pytest.raises(InputError, match="at most one turn"):
         bark_geometry(bark, preset, flat(0.5), turns=(0.5, 0.5))
+
+
+def test_lines_that_cross_or_touch_a_point_are_left_out() -> None:
+    points = np.array([[0, 0], [1, 1], [0, 1], [1, 0], [2, 0], [4, 0], [3, 0.0001], [5, 5], [6, 5]])
+    edges = np.array([[0, 1], [2, 3], [4, 5], [7, 8]])
+    np.testing.assert_array_equal(_uncrossed(points, edges), [[0, 1], [7, 8]])

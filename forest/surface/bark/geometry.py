@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from forest.errors import InputError
 from forest.surface.bark.dressing import relief_of
@@ -28,6 +29,7 @@ Surface = Callable[[_Floats, _Floats], tuple[_Floats, _Floats]]
 
 MATERIALS = ("epidermis", "inside")
 _GRAIN = 1e-7  # m: points nearer than that are one
+_NARROW = 2e-4  # m: a line with a point nearer to it is left out
 _TRIALS = 8  # of a triangulation
 _GUARDS = 24
 _CLEAR = 1e-3  # m: no line comes nearer to the piece's border
@@ -139,6 +141,7 @@ def bark_geometry(
     frame = _frame(turns, (low, high), spacing_m, girth)
     points = np.concatenate((frame, flat_points))
     points, edges = _welded(points, edges + len(frame))
+    edges = _uncrossed(points, edges)
     corner = np.array([[turns[0] * girth, low], [turns[1] * girth, high]])
     triangles = _sound_triangles(points, edges, corner)
     return _raised(
@@ -230,6 +233,36 @@ def _welded(points: _Floats, edges: _Edges) -> tuple[_Floats, _Edges]:
     edges = np.sort(np.asarray(to).reshape(-1)[edges], axis=1)
     edges = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
     return points[first], edges
+
+
+def _uncrossed(points: _Floats, edges: _Edges) -> _Edges:
+    """Drop lines that cross another one or run through a point: with them VTK may never end."""
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    middle, half = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1)
+    if not len(edges):
+        return edges
+    one, other = cKDTree(middle).query_pairs(2.0 * half.max(), output_type="ndarray").T
+    near = np.linalg.norm(middle[one] - middle[other], axis=1) <= half[one] + half[other]
+    one, other = one[near], other[near]
+    cross = (_side(a[one], b[one], a[other]) * _side(a[one], b[one], b[other]) < 0.0) & (
+        _side(a[other], b[other], a[one]) * _side(a[other], b[other], b[one]) < 0.0
+    )
+    sound = np.ones(len(edges), np.bool_)
+    sound[np.maximum(one, other)[cross]] = False
+    close = cKDTree(points).query_ball_point(middle, half)
+    edge = np.repeat(np.arange(len(edges)), [len(found) for found in close])
+    point = np.concatenate([np.asarray(found, np.int64) for found in close])
+    own = (point == edges[edge, 0]) | (point == edges[edge, 1])
+    off = np.abs(_side(a[edge], b[edge], points[point])) / (2.0 * half[edge])
+    sound[edge[~own & (off < _NARROW)]] = False
+    return edges[sound]
+
+
+def _side(a: _Floats, b: _Floats, p: _Floats) -> _Floats:
+    """Give twice the area of triangles, positive where they turn left."""
+    ab, ap = b - a, p - a
+    area: _Floats = ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]
+    return area
 
 
 def _sound_triangles(points: _Floats, edges: _Edges, corner: _Floats) -> NDArray[np.int64]:
